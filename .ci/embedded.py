@@ -11,7 +11,7 @@ EMBEDDED = re.compile(r'include_(?:str|bytes)!\(\s*"([^"]+)"')
 
 def embedded_files():
     files = set()
-    for source in [*TOP.glob("src/**/*.rs"), *TOP.glob("models/*.rs")]:
+    for source in [file for folder in ("src", "models", "prompts") for file in TOP.glob(f"{folder}/**/*.rs")]:
         if source.name == "tests.rs" or "tests" in source.relative_to(TOP).parent.parts:
             continue
         program = TESTS.split(source.read_text(encoding="utf-8"))[0]

@@ -1,7 +1,7 @@
 //! Internal items that the tests and benchmarks of this crate use. They may change with any version.
 
 pub mod ask {
-    pub use crate::ask::{
+    pub use darkqa_ask::{
         Access, AskError, BaseUrl, Call, Constrain, Endpoint, ExtraFields, ImageDetail, Message, Model, Parameters,
         Prompts, Query, Quota, Random, Reach, Remote, Script, Secret, Sending, SettingsOrigin, Temperature, Thinking,
         TokenField, WireSetting,
@@ -9,12 +9,12 @@ pub mod ask {
 }
 
 pub mod dataset {
-    pub use crate::data::maps::Picture;
-    pub use crate::data::{DataSource, Dataset, SetArgs, open_frames};
+    pub use darkqa_data::maps::Picture;
+    pub use darkqa_data::{DataSource, Dataset, SetArgs, open_frames};
 }
 
 pub mod report {
-    pub use crate::report::content::Report;
-    pub use crate::report::outputs::products;
-    pub use crate::report::page::PageInputs;
+    pub use darkqa_report::content::Report;
+    pub use darkqa_report::outputs::products;
+    pub use darkqa_report::page::PageInputs;
 }

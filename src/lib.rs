@@ -81,8 +81,9 @@
 //!
 //! # The map
 //!
-//! Twelve rooms, in the order of the data. A room is a folder of `src`; a folder with a `Cargo.toml` is a crate of its
-//! own, because it needs nothing of this one and then builds beside it. The main arrows; the table below has all:
+//! Twelve rooms, in the order of the data. A room is a folder of `src` and a crate of its own, so that it builds beside
+//! others, and again only after a change below it; `commands` is a part of this crate. The main arrows; the table below
+//! has all:
 //!
 //! ```text
 //! base ─┬─ pictures ─┬─ data ──────────┐
@@ -94,13 +95,13 @@
 //!
 //! | room | |
 //! |---|---|
-//! | `base` | the one error type; files read with bounds and written whole; the label spaces NYU40, mpcat40, ADE150 and NYU13; the vocabulary of a trial. At the root: `error`, `files`, `labels`, `types` |
+//! | `base` | the one error type; files read with bounds and written whole; the label spaces NYU40, mpcat40, ADE150 and NYU13; the vocabulary of a trial. |
 //! | `pictures` | image files with their colour profiles and orientation, maps of numbers, scaling, and images encoded for a request |
 //! | `light` | a clean image × a degradation → a degraded one, given a noise key; `light/python` is the Python module `darkqa_light` |
 //! | `data` | a folder, a ready-made set or the built-in rooms (`data/rooms`, drawn by a seed) → images, their maps and questions; `data/import`: other data sets, recordings of robots and videos → frames |
 //! | `questions` | a frame with its maps → questions with one true answer, by rule; the observer: what the rules could still answer from given pixels |
 //! | `enhance` | a degraded image → an enhanced one, by the user's ONNX model; `models` has the networks that the program carries |
-//! | `ask` | a prompt and images → a reply; `ask/wire`: the APIs of endpoints, their requests and replies |
+//! | `ask` | a prompt and images → a reply; `ask/wire`: the APIs of endpoints, their requests and replies; `prompts` has the prompts that the program carries |
 //! | `score` | `score/choice`: a reply → a choice, a mark or a text; `score/statistics`: estimates, tests and thresholds of clustered replies; records → numbers with their intervals |
 //! | `runs` | what is on disk: `runs/store`, the append-only folder of a run; shards and their merge; records as a table; `runs/python` reads it |
 //! | `report` | records → `report/sentences`, `report/tables`, `report/charts`, the page and its files; `report/joined`: of one run or several |
@@ -152,30 +153,20 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
-mod ask;
 mod commands;
-pub(crate) mod data;
-mod engine;
 #[doc(hidden)]
 pub mod internals;
-mod report;
-mod runs;
 
 #[doc(hidden)]
 pub use commands::cli;
 
-pub(crate) use darkqa_base::{error, files, labels, types};
-pub(crate) use darkqa_pictures as pictures;
-pub(crate) use darkqa_rooms as rooms;
-pub(crate) use darkqa_store as store;
-
-pub use error::{Error, Result};
-pub use runs::record_table::{Records, RunRecord, StoredRun};
-pub use types::degradations::Kind;
-pub use types::{
+pub use darkqa_base::error::{Error, Result};
+pub use darkqa_base::types::degradations::Kind;
+pub use darkqa_base::types::{
     Answer, Choices, Condition, Degradation, DepthKind, Digest, Family, Frame, FrameId, Intrinsics, Label, Labels,
     Question, QuestionId, Reply, Rgb, Segmentation, Severity, UnreadReason,
 };
+pub use darkqa_runs::record_table::{Records, RunRecord, StoredRun};
 
 /// Degraded versions of a clean frame, as a camera would take it in less light.
 pub mod synthesis {

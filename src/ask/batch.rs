@@ -14,9 +14,9 @@ use super::requests::Constrain;
 use super::secrets::{Scrub, without_secrets};
 use super::vendors::{BatchForm, Vendor, VendorBatch};
 use super::wire::{batch_reply, body_usage};
-use crate::ask::requests::field::constrained_letter;
-use crate::error::{Error, Result};
-use crate::types::{Failure, FailureKind, LostAttempts, Reply, Usage};
+use crate::requests::field::constrained_letter;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::{Failure, FailureKind, LostAttempts, Reply, Usage};
 
 /// Writes a line of an input file, with a line end: `{"custom_id", "method", "url", "body"}`, with the body of a single
 /// request.
@@ -28,7 +28,7 @@ pub(super) fn input_line(id: &str, url: &str, body: &[u8]) -> Result<Vec<u8>, se
 
 /// One line of an output or error file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct BatchLine {
+pub struct BatchLine {
     /// Id of the request, from the input line.
     pub id: String,
     /// The reply or the failure.
@@ -45,7 +45,7 @@ impl BatchLine {
     /// interfaces have. No key is known without a server, so no secret is removed. For lines from a server use
     /// [`BatchServer::line`](super::batch_api::BatchServer::line).
     #[must_use]
-    pub(crate) fn read(line: &str) -> Option<Self> {
+    pub fn read(line: &str) -> Option<Self> {
         let line = parse(line.trim_start_matches('\u{feff}')).ok()?;
         let has_result = ["response", "error"].iter().any(|field| line.get(field).is_some());
         has_result.then(|| Self::from_json(&line, &Scrub::default())).flatten()
@@ -157,7 +157,7 @@ fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
 
 /// Replaces the text of a constrained reply by its letter, if it has one.
 #[must_use]
-pub(crate) fn with_letter(reply: Reply, constrain: Constrain, choices: usize) -> Reply {
+pub fn with_letter(reply: Reply, constrain: Constrain, choices: usize) -> Reply {
     Reply {
         text: constrained_letter(constrain, choices, &reply.text).unwrap_or(reply.text),
         finish: reply.finish.shorten(),
@@ -167,7 +167,7 @@ pub(crate) fn with_letter(reply: Reply, constrain: Constrain, choices: usize) ->
 
 /// Properties of the Batch API at an address; those of OpenAI if the address is not in the table of vendors.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct BatchInterface {
+pub struct BatchInterface {
     vendor: Option<&'static Vendor>,
 }
 
@@ -180,7 +180,7 @@ const PURPOSE: &str = "batch";
 
 impl BatchInterface {
     /// Looks up the Batch API at a base URL.
-    pub(crate) fn at(base: &str) -> Self {
+    pub fn at(base: &str) -> Self {
         let base = base.parse::<BaseUrl>().ok();
         let vendor = base.and_then(|base| Vendor::at_host(base.host()));
         Self { vendor }
@@ -192,23 +192,23 @@ impl BatchInterface {
     }
 
     /// Purpose under which files are uploaded.
-    pub(crate) fn purpose(self) -> &'static str {
+    pub fn purpose(self) -> &'static str {
         self.entry().and_then(|entry| entry.purpose.as_deref()).unwrap_or(PURPOSE)
     }
 
     /// Maximum size of a file, in MB.
-    pub(crate) fn file_size(self) -> NonZeroU64 {
+    pub fn file_size(self) -> NonZeroU64 {
         self.entry().and_then(|entry| entry.file_size).unwrap_or(MAX_FILE_SIZE)
     }
 
     /// Maximum number of requests in a file.
-    pub(crate) fn requests(self) -> NonZeroUsize {
+    pub fn requests(self) -> NonZeroUsize {
         self.entry().and_then(|entry| entry.requests).unwrap_or(MAX_REQUESTS)
     }
 
     /// Path in the lines of a file, for requests with OpenAI's path `default`. Some vendors have another path for chat
     /// completions.
-    pub(crate) fn url(self, default: &str) -> &str {
+    pub fn url(self, default: &str) -> &str {
         if !default.ends_with("/chat/completions") {
             return default;
         }
@@ -219,7 +219,7 @@ impl BatchInterface {
     ///
     /// # Errors
     /// If the vendor has no Batch API, or one of another form.
-    pub(crate) fn require_files(self) -> Result<()> {
+    pub fn require_files(self) -> Result<()> {
         let name = self.vendor.map_or("", |vendor| &*vendor.name);
         let form = self.entry().map_or(BatchForm::Files, |entry| entry.form);
         let problem = match form {
@@ -237,7 +237,7 @@ impl BatchInterface {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::Finish;
+    use darkqa_base::types::Finish;
 
     /// A known key is removed from every recorded text; an unknown one is not.
     #[test]

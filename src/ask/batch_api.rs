@@ -29,8 +29,8 @@ use super::endpoints::{Connection, Deadline, HttpResponse};
 use super::failures::{ApiError, AskError, QuotaRefusal};
 use super::pace::retry_after;
 use super::secrets::Scrub;
-use crate::files::{self, create_new};
-use crate::types::FailureKind;
+use darkqa_base::files::{self, create_new};
+use darkqa_base::types::FailureKind;
 
 /// Minimum speed of an upload, in bytes per second, for its time limit; chosen.
 const MIN_UPLOAD_SPEED: u64 = 50_000;
@@ -39,11 +39,11 @@ const MIN_UPLOAD_SPEED: u64 = 50_000;
 const MAX_PAGES: usize = 100;
 
 /// Result of a call. Callers use only the message, status, wait, effect and quota of the error.
-pub(crate) type ApiResult<T> = Result<T, AskError>;
+pub type ApiResult<T> = Result<T, AskError>;
 
 /// Client of the Files and Batch APIs of a server.
 #[derive(Debug)]
-pub(crate) struct BatchServer {
+pub struct BatchServer {
     connection: Connection,
     headers: HeaderMap,
     timeout: Duration,
@@ -51,7 +51,7 @@ pub(crate) struct BatchServer {
 
 /// Parameters of a new batch.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct NewBatch<'a> {
+pub struct NewBatch<'a> {
     /// Id of the input file.
     pub file: &'a str,
     /// Path of the requests, such as `/v1/chat/completions`.
@@ -69,7 +69,7 @@ impl BatchServer {
     }
 
     /// Uploads a file under a name, for a purpose.
-    pub(crate) async fn upload(&self, path: &Path, name: &str, purpose: &str) -> ApiResult<RemoteFile> {
+    pub async fn upload(&self, path: &Path, name: &str, purpose: &str) -> ApiResult<RemoteFile> {
         // The boundary cannot occur in a file of requests: every line is one JSON object.
         let boundary = format!("darkqa-{name}").replace(|c: char| !c.is_ascii_alphanumeric(), "-");
         let boundary: String = boundary.chars().take(70).collect();
@@ -88,20 +88,20 @@ impl BatchServer {
     }
 
     /// Requests the file object with this id.
-    pub(crate) async fn file(&self, id: &str) -> ApiResult<RemoteFile> {
+    pub async fn file(&self, id: &str) -> ApiResult<RemoteFile> {
         let request = self.request(Method::GET, &format!("files/{}", path_segment(id)), &[]);
         let object = self.request_json(request).await?;
         RemoteFile::from_json(&object).ok_or_else(|| self.unreadable("a file without an id"))
     }
 
     /// Lists all files of a purpose.
-    pub(crate) async fn files(&self, purpose: &str) -> ApiResult<Vec<RemoteFile>> {
+    pub async fn files(&self, purpose: &str) -> ApiResult<Vec<RemoteFile>> {
         let items = self.list("files", &[("purpose", purpose)]).await?;
         Ok(items.iter().filter_map(RemoteFile::from_json).collect())
     }
 
     /// Downloads a file of at most `max_bytes` bytes to a path, and removes keys that the server repeats in it.
-    pub(crate) async fn download(&self, id: &str, to: &Path, max_bytes: u64) -> ApiResult<()> {
+    pub async fn download(&self, id: &str, to: &Path, max_bytes: u64) -> ApiResult<()> {
         let path = format!("files/{}/content", path_segment(id));
         let request = self.request(Method::GET, &path, &[]);
         let response =
@@ -116,18 +116,18 @@ impl BatchServer {
     /// Parses a line of an output or error file of this server, and removes the keys sent to the server. `None` if the
     /// line has another form.
     #[must_use]
-    pub(crate) fn line(&self, line: &str) -> Option<BatchLine> {
+    pub fn line(&self, line: &str) -> Option<BatchLine> {
         BatchLine::read_without_secrets(line, &self.connection.scrub())
     }
 
     /// Deletes a file.
-    pub(crate) async fn delete(&self, id: &str) -> ApiResult<()> {
+    pub async fn delete(&self, id: &str) -> ApiResult<()> {
         let request = self.request(Method::DELETE, &format!("files/{}", path_segment(id)), &[]);
         self.send(request).await.map(drop)
     }
 
     /// Creates a batch.
-    pub(crate) async fn create(&self, new: NewBatch<'_>) -> ApiResult<RemoteBatch> {
+    pub async fn create(&self, new: NewBatch<'_>) -> ApiResult<RemoteBatch> {
         let body = json!({
             "input_file_id": new.file, "endpoint": new.url, "completion_window": new.window,
             "metadata": { MARK: new.mark },
@@ -138,20 +138,20 @@ impl BatchServer {
     }
 
     /// Requests the batch with this id.
-    pub(crate) async fn batch(&self, id: &str) -> ApiResult<RemoteBatch> {
+    pub async fn batch(&self, id: &str) -> ApiResult<RemoteBatch> {
         let path = format!("batches/{}", path_segment(id));
         self.request_batch(self.request(Method::GET, &path, &[])).await
     }
 
     /// Lists all batches.
-    pub(crate) async fn batches(&self) -> ApiResult<Vec<RemoteBatch>> {
+    pub async fn batches(&self) -> ApiResult<Vec<RemoteBatch>> {
         let items = self.list("batches", &[]).await?;
         let scrub = self.connection.scrub();
         Ok(items.iter().filter_map(|item| RemoteBatch::from_json(item, &scrub)).collect())
     }
 
     /// Asks the server to cancel a batch.
-    pub(crate) async fn cancel(&self, id: &str) -> ApiResult<()> {
+    pub async fn cancel(&self, id: &str) -> ApiResult<()> {
         let path = format!("batches/{}/cancel", path_segment(id));
         self.send(self.request(Method::POST, &path, &[])).await.map(drop)
     }
@@ -258,7 +258,7 @@ fn path_segment(id: &str) -> String {
 
 /// A file at a server.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct RemoteFile {
+pub struct RemoteFile {
     /// Id of the file at the server.
     pub id: String,
     /// Name under which it was uploaded; empty if the server does not report it.
@@ -271,7 +271,7 @@ pub(crate) struct RemoteFile {
 
 /// Whether a batch can be created from a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Readiness {
+pub enum Readiness {
     /// A batch can be created.
     Ready,
     /// The server is still processing the file, as Azure does after an upload.
@@ -300,7 +300,7 @@ impl RemoteFile {
 
 /// State of a batch.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum BatchState {
+pub enum BatchState {
     /// The server is working on it; with the server's name of the state.
     Working(String),
     /// Completed, with replies to all or some requests.
@@ -330,7 +330,7 @@ impl BatchState {
     }
 
     /// Name of the state.
-    pub(crate) fn word(&self) -> &str {
+    pub fn word(&self) -> &str {
         match self {
             Self::Working(word) | Self::Unknown(word) => word,
             Self::Completed => "completed",
@@ -343,7 +343,7 @@ impl BatchState {
 
 /// Numbers of requests in a batch.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct RequestCounts {
+pub struct RequestCounts {
     /// Requests with a reply.
     pub answered: u64,
     /// Requests with a reply or a failure.
@@ -354,14 +354,14 @@ pub(crate) struct RequestCounts {
 
 impl RequestCounts {
     /// True if the server reports counts.
-    pub(crate) fn is_known(self) -> bool {
+    pub fn is_known(self) -> bool {
         self.total > 0 || self.done > 0
     }
 }
 
 /// A batch at a server.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct RemoteBatch {
+pub struct RemoteBatch {
     /// Id of the batch at the server.
     pub id: String,
     /// State of the batch.

@@ -18,13 +18,13 @@ use serde_json::{Map, Number, Value};
 const MAX_VALUES: usize = 200_000;
 
 /// Maximum number of items in a list, and of fields in an object; chosen.
-pub(crate) const MAX_ITEMS: usize = 10_000;
+pub const MAX_ITEMS: usize = 10_000;
 
 /// Parses a text that is one JSON value, [repaired] if necessary.
 ///
 /// # Errors
 /// If the text is not a single complete JSON value.
-pub(crate) fn parse(text: &str) -> serde_json::Result<Value> {
+pub fn parse(text: &str) -> serde_json::Result<Value> {
     parse_valid(text).or_else(|error| repaired(text).and_then(|text| parse_valid(&text).ok()).ok_or(error))
 }
 
@@ -40,7 +40,7 @@ fn parse_valid(text: &str) -> serde_json::Result<Value> {
 ///
 /// # Errors
 /// If the text does not start with a complete JSON value.
-pub(crate) fn parse_start(text: &str) -> serde_json::Result<Value> {
+pub fn parse_start(text: &str) -> serde_json::Result<Value> {
     bounded(&mut serde_json::Deserializer::from_str(text))
 }
 

@@ -12,10 +12,11 @@ use minijinja::{AutoEscape, Environment, UndefinedBehavior, Value, context};
 use regex::Regex;
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, Result};
-use crate::files;
-use crate::types::questions::letter;
-use crate::types::{Choices, Digest, Evidence, Family, FrameId, Question, QuestionId, View};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::questions::letter;
+use darkqa_base::types::{Choices, Digest, Evidence, Family, FrameId, Question, QuestionId, View};
+use darkqa_prompts::{LETTER, PAPER, TERSE, Templates, openeqa};
 
 /// Template for questions with the image.
 const CHOICE: &str = "choice.txt";
@@ -44,14 +45,8 @@ impl Prompts {
     /// Never in practice: tests render the embedded templates.
     pub fn built_in(name: &str) -> Result<Self> {
         Self::new(match name {
-            "terse" => Sources::new(
-                include_str!("../../prompts/terse/choice.txt"),
-                include_str!("../../prompts/terse/blind.txt"),
-            ),
-            "letter" => Sources::new(
-                include_str!("../../prompts/letter/choice.txt"),
-                include_str!("../../prompts/letter/blind.txt"),
-            ),
+            "terse" => Sources::from(TERSE),
+            "letter" => Sources::from(LETTER),
             _ => Sources::default(),
         })
     }
@@ -113,7 +108,7 @@ impl Prompts {
 
     /// The templates, for the manifest of a run; `None` for the built-in ones, which each version has.
     #[must_use]
-    pub(crate) fn stored(&self) -> Option<serde_json::Value> {
+    pub fn stored(&self) -> Option<serde_json::Value> {
         let sources = (self.digest != Sources::default().digest()).then_some(&self.sources)?;
         serde_json::to_value(sources).ok()
     }
@@ -121,7 +116,7 @@ impl Prompts {
     /// The prompts of a run, from the digest and the templates in its manifest; `None` if the manifest lacks them, as
     /// those of earlier versions do, or states others.
     #[must_use]
-    pub(crate) fn from_stored(digest: &str, stored: Option<&serde_json::Value>) -> Option<Self> {
+    pub fn from_stored(digest: &str, stored: Option<&serde_json::Value>) -> Option<Self> {
         let sources = match stored {
             Some(stored) => serde_json::from_value(stored.clone()).ok()?,
             None => Sources::default(),
@@ -142,7 +137,7 @@ impl Prompts {
     ///
     /// # Errors
     /// As for [`render`](Self::render).
-    pub(crate) fn render_texts(&self, view: View, question: &str, texts: &[String]) -> Result<String> {
+    pub fn render_texts(&self, view: View, question: &str, texts: &[String]) -> Result<String> {
         let name = match view {
             View::Image => CHOICE,
             View::Blind => BLIND,
@@ -189,7 +184,13 @@ impl Sources {
 
 impl Default for Sources {
     fn default() -> Self {
-        Self::new(include_str!("../../prompts/choice.txt"), include_str!("../../prompts/blind.txt"))
+        Self::from(PAPER)
+    }
+}
+
+impl From<Templates> for Sources {
+    fn from(templates: Templates) -> Self {
+        Self::new(templates.choice, templates.blind)
     }
 }
 
@@ -211,17 +212,11 @@ fn sample_question() -> Result<Question> {
     })
 }
 
-// Templates of upstream (MIT, Meta Platforms). Callers trim each template, as upstream does.
-const VISION: &str = include_str!("../../prompts/openeqa/vision.txt");
-const OPENEQA_BLIND: &str = include_str!("../../prompts/openeqa/blind.txt");
-const MATCH: &str = include_str!("../../prompts/openeqa/match.txt");
-const MATCH_EXTRA: &str = include_str!("../../prompts/openeqa/match-extra.txt");
-
 /// Prompt for a model with images: the text before the images and the text after them.
 #[must_use]
-pub(crate) fn vision(question: &str) -> (String, String) {
+pub fn vision(question: &str) -> (String, String) {
     const QUERY: &str = "User Query:";
-    let template = VISION.trim();
+    let template = openeqa::VISION.trim();
     let (before, after) = template.split_once(QUERY).unwrap_or((template, ""));
     let after = fill(after, &[("question", question)]);
     (before.to_owned(), format!("{QUERY}{after}"))
@@ -229,14 +224,14 @@ pub(crate) fn vision(question: &str) -> (String, String) {
 
 /// Prompt for a model without images.
 #[must_use]
-pub(crate) fn blind(question: &str) -> String {
-    fill(OPENEQA_BLIND.trim(), &[("question", question)])
+pub fn blind(question: &str) -> String {
+    fill(openeqa::BLIND.trim(), &[("question", question)])
 }
 
 /// Extracts the answer from a blind model's reply, as upstream's `parse_output`: the rest of the line after the first
 /// "A:", without any further "A:". `None` for a reply without "A:", which is an error upstream.
 #[must_use]
-pub(crate) fn blind_answer(reply: &str) -> Option<String> {
+pub fn blind_answer(reply: &str) -> Option<String> {
     let (_, after) = reply.split_once("A:")?;
     let line = after.split('\n').next().unwrap_or(after);
     Some(line.replace("A:", "").trim().to_owned())
@@ -245,14 +240,14 @@ pub(crate) fn blind_answer(reply: &str) -> Option<String> {
 /// Prompt that asks the judge to rate `prediction` against the reference `answer`. Extra answers, even an empty list,
 /// select another template.
 #[must_use]
-pub(crate) fn judge_prompt(question: &str, answer: &str, extra: Option<&[String]>, prediction: &str) -> String {
+pub fn judge_prompt(question: &str, answer: &str, extra: Option<&[String]>, prediction: &str) -> String {
     let values = [("question", question), ("answer", answer), ("prediction", prediction)];
     match extra {
-        None => fill(MATCH.trim(), &values),
+        None => fill(openeqa::MATCH.trim(), &values),
         Some(extra) => {
             let list = python_list(extra);
             let values = [values[0], values[1], values[2], ("extra_answers", &*list)];
-            fill(MATCH_EXTRA.trim(), &values)
+            fill(openeqa::MATCH_EXTRA.trim(), &values)
         }
     }
 }
@@ -326,7 +321,7 @@ fn is_unprintable(c: char) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::Digest;
+    use darkqa_base::types::Digest;
 
     fn question(text: &str, choices: &[&str]) -> Question {
         let texts = choices.iter().map(|&text| text.to_owned()).collect();
@@ -429,7 +424,9 @@ mod tests {
     #[test]
     fn template_lengths_match_upstream() {
         // Sizes in bytes of the trimmed files at cfa3fce.
-        for (template, bytes) in [(VISION, 321), (OPENEQA_BLIND, 613), (MATCH, 669), (MATCH_EXTRA, 997)] {
+        for (template, bytes) in
+            [(openeqa::VISION, 321), (openeqa::BLIND, 613), (openeqa::MATCH, 669), (openeqa::MATCH_EXTRA, 997)]
+        {
             assert_eq!(template.trim().len(), bytes, "{}", Digest::from_bytes(template.as_bytes()));
         }
     }

@@ -11,9 +11,9 @@ use serde::Deserialize;
 use super::endpoints::BaseUrl;
 use super::requests::TokenField;
 use super::secrets::{KeyHeader, looks_like_key};
-use crate::error::{Error, Result};
-use crate::files;
-use crate::types::text::TomlFault;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::text::TomlFault;
 
 /// A vendor that hosts models, and the properties of its endpoints. `None` means unknown, unless a field states
 /// otherwise.
@@ -21,11 +21,11 @@ use crate::types::text::TomlFault;
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Vendor {
     /// Name of the vendor, for messages.
-    pub(crate) name: String,
+    pub name: String,
     /// Host name suffixes of its endpoints, such as `api.example.com` or `.example.com`.
     hosts: Vec<String>,
     /// Environment variables in which the vendor's own tools look for a key, in this order.
-    pub(crate) key: Vec<String>,
+    pub key: Vec<String>,
     /// Patterns of keys that only this vendor uses, with `*` for any text; empty if there are none.
     #[serde(default)]
     key_form: Vec<String>,
@@ -37,28 +37,28 @@ pub struct Vendor {
     token_field: LimitField,
     /// True if reasoning tokens do not count toward the token limit.
     #[serde(default)]
-    pub(crate) thinks_beyond_limit: bool,
+    pub thinks_beyond_limit: bool,
     /// Maximum size of an image file, in bytes.
-    pub(crate) image_bytes: Option<usize>,
+    pub image_bytes: Option<usize>,
     /// Maximum side of an image, in pixels.
-    pub(crate) image_side: Option<u32>,
+    pub image_side: Option<u32>,
     /// Maximum number of images in a request.
-    pub(crate) images: Option<usize>,
+    pub images: Option<usize>,
     /// Maximum side of an image, in pixels, if a request has more than 20 images.
-    pub(crate) image_side_many: Option<u32>,
+    pub image_side_many: Option<u32>,
     /// Maximum size of a request body, in bytes.
-    pub(crate) request_bytes: Option<usize>,
+    pub request_bytes: Option<usize>,
     /// Why replies lack token probabilities; `None` if some models return them, or if that is unknown.
     logprobs: Option<Logprobs>,
     /// Batch API; `None` if unknown.
-    pub(crate) batch: Option<VendorBatch>,
+    pub batch: Option<VendorBatch>,
     /// Failure to constrain replies; `None` if the vendor obeys a constraint, or if that is unknown.
     constrain: Option<Constraining>,
     /// Field of the request body without which requests are not repeatable.
-    pub(crate) pin: Option<String>,
+    pub pin: Option<String>,
     /// Headers that name the account and are not secret, each with the environment variable that holds its value.
     #[serde(default)]
-    pub(crate) account: BTreeMap<String, String>,
+    pub account: BTreeMap<String, String>,
     /// Valid forms of a base URL; empty if a base URL without a path is valid.
     #[serde(default)]
     addresses: Vec<String>,
@@ -115,7 +115,7 @@ static VENDORS: LazyLock<Vendors> = LazyLock::new(|| {
 
 impl Vendor {
     /// Finds the vendor of a host; `None` if the built-in table lacks the host.
-    pub(crate) fn at_host(host: &str) -> Option<&'static Self> {
+    pub fn at_host(host: &str) -> Option<&'static Self> {
         VENDORS.vendor.iter().find(|vendor| vendor.owns_host(host))
     }
 
@@ -132,12 +132,12 @@ impl Vendor {
 
     /// True if the built-in table lists exactly this host name. A name below a listed domain may belong to any
     /// customer.
-    pub(crate) fn has_host(host: &str) -> bool {
+    pub fn has_host(host: &str) -> bool {
         VENDORS.vendor.iter().flat_map(|vendor| &vendor.hosts).any(|known| known == host)
     }
 
     /// True if the host belongs to this vendor.
-    pub(crate) fn owns_host(&self, host: &str) -> bool {
+    pub fn owns_host(&self, host: &str) -> bool {
         self.hosts.iter().any(|suffix| matches_host_suffix(host, suffix))
     }
 
@@ -158,7 +158,7 @@ impl Vendor {
     ///
     /// # Errors
     /// The message lists the valid forms.
-    pub(crate) fn check_address(&self, base: &BaseUrl) -> Result<(), Error> {
+    pub fn check_address(&self, base: &BaseUrl) -> Result<(), Error> {
         if self.addresses.is_empty() || base.has_path() {
             return Ok(());
         }
@@ -168,12 +168,12 @@ impl Vendor {
     }
 
     /// True if constraints on replies have no effect at this vendor.
-    pub(crate) fn ignores_constraints(&self) -> bool {
+    pub fn ignores_constraints(&self) -> bool {
         self.constrain == Some(Constraining::Ignored)
     }
 
     /// Why the vendor returns no token probabilities, as a verb phrase for messages; `None` if it may return them.
-    pub(crate) fn without_probabilities(&self) -> Option<&'static str> {
+    pub fn without_probabilities(&self) -> Option<&'static str> {
         self.logprobs.map(|logprobs| match logprobs {
             Logprobs::Ignored => "takes the request for probabilities and ignores it",
             Logprobs::No => "states no probabilities of tokens",
@@ -181,7 +181,7 @@ impl Vendor {
     }
 
     /// Header in which the vendor expects the key.
-    pub(crate) fn key_header(&self) -> KeyHeader {
+    pub fn key_header(&self) -> KeyHeader {
         match self.header {
             Header::Bearer => KeyHeader::Bearer,
             Header::ApiKey => KeyHeader::ApiKey,
@@ -189,7 +189,7 @@ impl Vendor {
     }
 
     /// Resolves `Auto` to the field that the vendor expects, or to `MaxTokens` without a vendor. Never returns `Auto`.
-    pub(crate) fn token_field_at(vendor: Option<&Self>, field: TokenField) -> TokenField {
+    pub fn token_field_at(vendor: Option<&Self>, field: TokenField) -> TokenField {
         match field {
             TokenField::Auto => vendor.map_or(TokenField::MaxTokens, Self::token_field),
             field => field,
@@ -289,23 +289,23 @@ fn invalid_file(path: &Path, problem: &str) -> Error {
 /// Batch API of a vendor; `None` in a field means the value of OpenAI.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub(crate) struct VendorBatch {
+pub struct VendorBatch {
     #[serde(default)]
-    pub(crate) form: BatchForm,
+    pub form: BatchForm,
     /// Purpose under which files are uploaded.
-    pub(crate) purpose: Option<String>,
+    pub purpose: Option<String>,
     /// Maximum size of a file, in MB.
-    pub(crate) file_size: Option<NonZeroU64>,
+    pub file_size: Option<NonZeroU64>,
     /// Maximum number of requests in a file.
-    pub(crate) requests: Option<NonZeroUsize>,
+    pub requests: Option<NonZeroUsize>,
     /// Path of chat completions in the lines of a file.
-    pub(crate) url: Option<String>,
+    pub url: Option<String>,
 }
 
 /// Form of a Batch API.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum BatchForm {
+pub enum BatchForm {
     /// Batches of uploaded files, as at OpenAI.
     #[default]
     Files,
@@ -332,7 +332,7 @@ mod tests {
             assert!(!vendor.key.is_empty(), "{}", vendor.name);
             assert_eq!(vendor.check(), Ok(()), "{}", vendor.name);
             hosts.extend(&vendor.hosts);
-            assert!(vendor.key.iter().all(|name| !crate::ask::secrets::looks_like_key(name)), "{}", vendor.name);
+            assert!(vendor.key.iter().all(|name| !crate::secrets::looks_like_key(name)), "{}", vendor.name);
         }
         let count = hosts.len();
         hosts.sort();

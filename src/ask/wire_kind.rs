@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 
-use crate::types::flags::flag_words;
+use darkqa_base::types::flags::flag_words;
 
 /// API for requests to a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,16 +5,16 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use super::prompts::Prompts;
-use crate::error::{Error, Result};
-use crate::types::Shared;
-use crate::types::text::is_in_names;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Shared;
+use darkqa_base::types::text::is_in_names;
 
 /// The flag that names prompts.
 const FLAG: &str = "--prompts";
 
 /// One value of `--prompts`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum PromptSet {
+pub enum PromptSet {
     /// Built-in prompts by their name.
     BuiltIn(&'static str),
     /// Prompts in a folder, which has a name if it is one of several.
@@ -24,7 +24,7 @@ pub(crate) enum PromptSet {
 impl PromptSet {
     /// The folder of the prompts; `None` if they are built in.
     #[must_use]
-    pub(crate) fn folder(&self) -> Option<&Path> {
+    pub fn folder(&self) -> Option<&Path> {
         match self {
             Self::BuiltIn(_) => None,
             Self::Folder { folder, .. } => Some(folder),
@@ -83,11 +83,11 @@ fn is_name(name: &str) -> bool {
 
 /// One set of prompts of a run.
 #[derive(Debug)]
-pub(crate) struct Wording {
+pub struct Wording {
     /// The name in records and tables; `None` if the run has a single wording.
-    pub(crate) name: Option<Shared<String>>,
+    pub name: Option<Shared<String>>,
     /// The templates.
-    pub(crate) prompts: Prompts,
+    pub prompts: Prompts,
 }
 
 impl Wording {
@@ -96,7 +96,7 @@ impl Wording {
     /// # Errors
     /// If prompts cannot be read, or if one of several sets has no name, the name of another, or its text: every
     /// request would be paid twice.
-    pub(crate) fn open(sets: &[PromptSet]) -> Result<Vec<Self>> {
+    pub fn open(sets: &[PromptSet]) -> Result<Vec<Self>> {
         match sets {
             [] => Ok(vec![Self { name: None, prompts: Prompts::built_in(Prompts::DEFAULT)? }]),
             [only] => Ok(vec![Self { name: None, prompts: only.open()? }]),
@@ -169,7 +169,7 @@ mod tests {
     #[test]
     fn wordings_that_would_be_paid_twice_are_refused() {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("choice.txt"), include_str!("../../prompts/choice.txt")).unwrap();
+        std::fs::write(folder.path().join("choice.txt"), darkqa_prompts::PAPER.choice).unwrap();
         let path = folder.path().display();
         for (sets, expected) in [
             (["terse", "terse"].map(str::to_owned), "two wordings are named terse"),

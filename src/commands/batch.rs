@@ -7,17 +7,17 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::ask::AccessArgs;
-use crate::engine::batch::{CollectArgs, FolderBatches, FolderTask, replies};
-use crate::engine::images::progress::Progress;
-use crate::error::Result;
-use crate::report::joined::written;
-use crate::runs::stored::{ExperimentKind, StoredRun, read_run_manifest};
-use crate::runs::{Outcome, PrintArgs, StdoutFormat, record_table};
-use crate::store::{AddressChange, Store};
-use crate::types::manifests::{Counts, RunManifest, Status};
-use crate::types::{ChoiceDetail, Decides, OpenDetail, TrialRef};
+use darkqa_ask::AccessArgs;
+use darkqa_base::error::Result;
+use darkqa_base::types::manifests::{Counts, RunManifest, Status};
+use darkqa_base::types::{ChoiceDetail, Decides, OpenDetail, TrialRef};
+use darkqa_engine::batch::{CollectArgs, FolderBatches, FolderTask, replies};
+use darkqa_engine::images::progress::Progress;
+use darkqa_report::joined::written;
+use darkqa_runs::stored::{ExperimentKind, StoredRun, read_run_manifest};
+use darkqa_runs::{Outcome, PrintArgs, StdoutFormat, record_table};
 use darkqa_score::answers::record::Detail;
+use darkqa_store::{AddressChange, Store};
 
 /// The flags of `batch import`.
 #[derive(Debug, Args)]

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::engine::image_cache::{clear, listing};
-use crate::error::Result;
-use crate::runs::Outcome;
-use crate::types::Decides;
-use crate::types::manifests::Status;
+use darkqa_base::error::Result;
+use darkqa_base::types::Decides;
+use darkqa_base::types::manifests::Status;
+use darkqa_engine::image_cache::{clear, listing};
+use darkqa_runs::Outcome;
 
 /// The flags of `cache`.
 #[derive(Debug, Args)]

@@ -12,28 +12,28 @@ use clap::{Args, Subcommand};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::data::inputs::Inputs;
-use crate::data::{FolderArgs, Picture};
-use crate::engine::images::enhancement::enhancers::{EnhancerModels, EnhancerRunArgs};
-use crate::engine::images::enhancement::latency::Latency;
-use crate::engine::images::enhancement::{dark_or_darkened, evenly_spaced_indices};
-use crate::engine::images::frames::InputTally;
-use crate::engine::images::progress::Progress;
-use crate::engine::images::stored::{ImageCounts, ImageOrigin, ImageRefusals, OutputImage};
-use crate::engine::manifest;
-use crate::error::{Error, Result};
-use crate::files::write;
-use crate::pictures::{Payload, PayloadFormat, png};
-use crate::report::charts::sheet::{ContactColumn, contact};
-use crate::report::template::render;
-use crate::runs::Outcome;
-use crate::runs::resolved_shard::{ShardArgs, keep_shard};
-use crate::types::manifests::Status;
-use crate::types::{Decides, Digest, EnhancerName, FrameId, InputNote, Rgb, Severity};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::write;
+use darkqa_base::types::manifests::Status;
+use darkqa_base::types::{Decides, Digest, EnhancerName, FrameId, InputNote, Rgb, Severity};
+use darkqa_data::inputs::Inputs;
+use darkqa_data::{FolderArgs, Picture};
+use darkqa_engine::images::enhancement::enhancers::{EnhancerModels, EnhancerRunArgs};
+use darkqa_engine::images::enhancement::latency::Latency;
+use darkqa_engine::images::enhancement::{dark_or_darkened, evenly_spaced_indices};
+use darkqa_engine::images::frames::InputTally;
+use darkqa_engine::images::progress::Progress;
+use darkqa_engine::images::stored::{ImageCounts, ImageOrigin, ImageRefusals, OutputImage};
+use darkqa_engine::manifest;
 use darkqa_enhance::{
     Enhancer, Examination, FRAMES, ImageOutput, ModelFile, Settled, SizeArgs, burnt_out, list_of_presets,
 };
 use darkqa_light::expose;
+use darkqa_pictures::{Payload, PayloadFormat, png};
+use darkqa_report::charts::sheet::{ContactColumn, contact};
+use darkqa_report::template::render;
+use darkqa_runs::Outcome;
+use darkqa_runs::resolved_shard::{ShardArgs, keep_shard};
 
 /// Maximum number of outputs tried as the image. Chosen: models that output each of their steps have fewer.
 const MAX_OUTPUTS: usize = 16;

@@ -12,29 +12,29 @@ use base64::engine::general_purpose::STANDARD;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use crate::data::{self, DataSource, Dataset, DecodeArgs, SceneArgs, SelectionArgs, SetArgs};
-use crate::engine::images::enhancement::enhancers::{self, EnhancerModels, EnhancerRunArgs};
-use crate::engine::images::frame_work::FrameWork;
-use crate::engine::images::frames::{Source, input_summary, inspect_all, photographs, warn_of_inputs};
-use crate::engine::images::image_pipeline::ImagePipeline;
-use crate::engine::images::progress::Progress;
-use crate::engine::images::recipes::Recipe;
-use crate::engine::images::timings::{ImageSteps, Timings};
-use crate::engine::images::trials::{check_enhanced, check_used, conditions, open_data, rules, select};
-use crate::engine::images::workers::pool;
-use crate::error::{Error, Result};
-use crate::files::{create_new, write};
-use crate::pictures::png;
-use crate::runs::Outcome;
-use crate::runs::resolved_shard::{ShardArgs, keep_shard};
-use crate::runs::shard::Shard;
-use crate::types::manifests::PngForm;
-use crate::types::manifests::Status;
-use crate::types::questions::letter;
-use crate::types::text::counted;
-use crate::types::{Choices, Condition, Decides, FrameId, Question};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{create_new, write};
+use darkqa_base::types::manifests::PngForm;
+use darkqa_base::types::manifests::Status;
+use darkqa_base::types::questions::letter;
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{Choices, Condition, Decides, FrameId, Question};
+use darkqa_data::{DataSource, Dataset, DecodeArgs, SceneArgs, SelectionArgs, SetArgs};
+use darkqa_engine::images::enhancement::enhancers::{self, EnhancerModels, EnhancerRunArgs};
+use darkqa_engine::images::frame_work::FrameWork;
+use darkqa_engine::images::frames::{Source, input_summary, inspect_all, photographs, warn_of_inputs};
+use darkqa_engine::images::image_pipeline::ImagePipeline;
+use darkqa_engine::images::progress::Progress;
+use darkqa_engine::images::recipes::Recipe;
+use darkqa_engine::images::timings::{ImageSteps, Timings};
+use darkqa_engine::images::trials::{check_enhanced, check_used, conditions, open_data, rules, select};
+use darkqa_engine::images::workers::pool;
 use darkqa_enhance::EnhancerArgs;
 use darkqa_light::{LightArgs, LightSettings};
+use darkqa_pictures::png;
+use darkqa_runs::Outcome;
+use darkqa_runs::resolved_shard::{ShardArgs, keep_shard};
+use darkqa_runs::shard::Shard;
 
 /// The flags of `export`.
 #[derive(Debug, Args)]
@@ -43,7 +43,7 @@ pub(crate) struct ExportArgs {
     #[arg(value_name = "KIND", value_enum, add = Decides::Nothing)]
     pub kind: SetForm,
     /// A folder of frames, or a ready-made set (.parquet, .tsv, .csv, .json, .jsonl, a folder of them)
-    #[arg(value_name = "DATA", value_parser = data::parse_data_source, add = Decides::Reply)]
+    #[arg(value_name = "DATA", value_parser = darkqa_data::parse_data_source, add = Decides::Reply)]
     pub data: DataSource,
     /// Where the sets go, one for each condition
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]

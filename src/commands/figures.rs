@@ -8,21 +8,21 @@ use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 
-use crate::error::{Error, Result};
-use crate::files;
-use crate::pictures::{decode_data_url, png};
-use crate::report::charts::figures::{
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::Decides;
+use darkqa_base::types::manifests::Status;
+use darkqa_base::types::text::escape_hidden;
+use darkqa_pictures::{decode_data_url, png};
+use darkqa_report::charts::figures::{
     DisplayNames, FIGURES, FigureSpec, KnownNames, figure_specs, missing_threshold_message, overview, paper_tables,
 };
-use crate::report::charts::paper::{
+use darkqa_report::charts::paper::{
     FigureColours, Look, OverviewSheet, Sheet, overview_sheet, pdf, sheet, svg, tables, tex,
 };
-use crate::report::joined::FigureRuns;
-use crate::report::text::table::Table;
-use crate::runs::Outcome;
-use crate::types::Decides;
-use crate::types::manifests::Status;
-use crate::types::text::escape_hidden;
+use darkqa_report::joined::FigureRuns;
+use darkqa_report::text::table::Table;
+use darkqa_runs::Outcome;
 
 /// Name of the sheet with an overview of a run in four panels.
 const PAPER: &str = "paper";

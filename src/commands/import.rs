@@ -18,21 +18,21 @@ use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use self::conversion::{conversion, not_a_bag};
-use crate::data::FolderArgs;
-use crate::data::frame_folder::{self, FrameOutput};
-use crate::data::import::keyframes::{KeyFrameArgs, choose};
-use crate::data::import::{Adapter, DataSetKind, FrameMaps, ListedFrame, MapArgs, open_all, unread_files};
-use crate::engine::images::frames::InputTally;
-use crate::engine::images::progress::Progress;
-use crate::engine::images::workers::{ThreadArgs, pool};
-use crate::error::{Error, Result};
-use crate::files::open;
-use crate::pictures::{ImageFile, png};
-use crate::report::text::words::first_names;
-use crate::runs::Outcome;
-use crate::types::manifests::Status;
-use crate::types::text::counted;
-use crate::types::{Decides, FrameId, InputNote, Rgb};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::open;
+use darkqa_base::types::manifests::Status;
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{Decides, FrameId, InputNote, Rgb};
+use darkqa_data::FolderArgs;
+use darkqa_data::frame_folder::{self, FrameOutput};
+use darkqa_data::import::keyframes::{KeyFrameArgs, choose};
+use darkqa_data::import::{Adapter, DataSetKind, FrameMaps, ListedFrame, MapArgs, open_all, unread_files};
+use darkqa_engine::images::frames::InputTally;
+use darkqa_engine::images::progress::Progress;
+use darkqa_engine::images::workers::{ThreadArgs, pool};
+use darkqa_pictures::{ImageFile, png};
+use darkqa_report::text::words::first_names;
+use darkqa_runs::Outcome;
 
 /// Plausible typical depths of indoor frames, in millimetres (chosen). Outside this range, the depth scale is probably
 /// wrong.

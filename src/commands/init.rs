@@ -7,18 +7,18 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
-use crate::data::{DataSource, SceneArgs, SelectionArgs, SetArgs, open_images};
-use crate::engine::images::progress::Progress;
-use crate::engine::images::trials::open_data;
-use crate::error::{Error, Result};
-use crate::files::{self, write};
-use crate::pictures::{DecodeRule, png};
-use crate::runs::Outcome;
-use crate::types::manifests::Status;
-use crate::types::questions::letter;
-use crate::types::text::counted;
-use crate::types::{Decides, FrameId, Question, shell_word};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{self, write};
+use darkqa_base::types::manifests::Status;
+use darkqa_base::types::questions::letter;
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{Decides, FrameId, Question, shell_word};
+use darkqa_data::{DataSource, SceneArgs, SelectionArgs, SetArgs, open_images};
+use darkqa_engine::images::progress::Progress;
+use darkqa_engine::images::trials::open_data;
+use darkqa_pictures::{DecodeRule, png};
 use darkqa_questions::rules::Rules;
+use darkqa_runs::Outcome;
 
 /// The flags of `init`.
 #[derive(Debug, Args)]

@@ -4,17 +4,17 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::error::{Error, Result};
-use crate::files::FolderAccess;
-use crate::report::joined::written;
-use crate::runs::missing_thumbnails::MissingThumbnails;
-use crate::runs::shard_records::append_records;
-use crate::runs::sharded_run::{MissingShards, ShardedRun, common_kind, run_folders_in};
-use crate::runs::stored::{ExperimentKind, StoredRun};
-use crate::runs::{Outcome, PrintArgs, StdoutFormat, record_table};
-use crate::store::{self, AddressChange, Store};
-use crate::types::{ChoiceDetail, Decides, OpenDetail};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::FolderAccess;
+use darkqa_base::types::{ChoiceDetail, Decides, OpenDetail};
+use darkqa_report::joined::written;
+use darkqa_runs::missing_thumbnails::MissingThumbnails;
+use darkqa_runs::shard_records::append_records;
+use darkqa_runs::sharded_run::{MissingShards, ShardedRun, common_kind, run_folders_in};
+use darkqa_runs::stored::{ExperimentKind, StoredRun};
+use darkqa_runs::{Outcome, PrintArgs, StdoutFormat, record_table};
 use darkqa_score::answers::record::Detail;
+use darkqa_store::{AddressChange, Store};
 
 /// The flags of `report merge`.
 #[derive(Debug, Args)]
@@ -80,7 +80,7 @@ fn merge_all<D: Detail>(
 fn run_folders(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut folders = Vec::new();
     for path in named {
-        if store::schema(path)?.is_some() {
+        if darkqa_store::schema(path)?.is_some() {
             folders.push(path.clone());
             continue;
         }

@@ -1,4 +1,4 @@
-//! One folder or file per command. Shared code is in [`engine`](crate::engine), [`report`](crate::report) or below; no
+//! One folder or file per command. Shared code is in [`engine`](darkqa_engine), [`report`](darkqa_report) or below; no
 //! command uses the folder of another.
 
 pub(crate) mod batch;

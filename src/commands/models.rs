@@ -6,15 +6,15 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::engine::images::progress::Progress;
-use crate::engine::models::{
+use darkqa_base::error::Result;
+use darkqa_base::types::Decides;
+use darkqa_base::types::manifests::Status;
+use darkqa_engine::images::progress::Progress;
+use darkqa_engine::models::{
     AskSettings, AskingArgs, KeyUse, ModelArgs, ResolveContext, TextBaseline, check, describe,
 };
-use crate::error::Result;
-use crate::runs::Outcome;
-use crate::runs::shard::Shard;
-use crate::types::Decides;
-use crate::types::manifests::Status;
+use darkqa_runs::Outcome;
+use darkqa_runs::shard::Shard;
 
 /// The flags of `models`.
 #[derive(Debug, Args)]

@@ -8,16 +8,16 @@ use clap::Args;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
-use crate::data::frame_folder::{self, FRAMES, FrameOutput};
-use crate::engine::images::progress::Progress;
-use crate::engine::images::workers::{ThreadArgs, pool};
-use crate::error::{Error, Result};
-use crate::pictures::{exr, png};
-use crate::rooms::{self, Room, Rooms};
-use crate::runs::Outcome;
-use crate::types::manifests::Status;
-use crate::types::text::counted;
-use crate::types::{Decides, FrameId, Labels, SegmentName};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::Status;
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{Decides, FrameId, Labels, SegmentName};
+use darkqa_data::frame_folder::{self, FRAMES, FrameOutput};
+use darkqa_engine::images::progress::Progress;
+use darkqa_engine::images::workers::{ThreadArgs, pool};
+use darkqa_pictures::{exr, png};
+use darkqa_rooms::{Room, Rooms};
+use darkqa_runs::Outcome;
 
 /// The flags of `rooms`.
 #[derive(Debug, Args)]
@@ -72,9 +72,9 @@ pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
         "schema": "darkqa.dataset/1",
         "name": args.rooms.title(),
         "label_space": "mpcat40",
-        "source": format!("darkqa-eval rooms {} {}", rooms::VERSION, args.rooms),
+        "source": format!("darkqa-eval rooms {} {}", darkqa_rooms::VERSION, args.rooms),
     });
-    let labels: Labels = rooms::labels();
+    let labels: Labels = darkqa_rooms::labels();
     let lines = frames.iter().map(|frame| &frame.line);
     frame_folder::write_folder_files(&args.out, &labels, &info, lines)?;
     Ok(Outcome::wrote(

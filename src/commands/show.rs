@@ -13,26 +13,26 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use crate::data::inputs::stem;
-use crate::data::ready_made::is_zip_file;
-use crate::engine::image_rebuilder::{ImageRebuilder, RebuildArgs};
-use crate::engine::images::notes::montage;
-use crate::error::{Error, Result};
-use crate::files::write;
-use crate::pictures::{Payload, PayloadFormat};
-use crate::report::charts::figures::StoryCurves;
-use crate::report::charts::sheet::{Story, StoryCell, StoryMark, StoryRow, story};
-use crate::report::joined::story_curves;
-use crate::report::text::words;
-use crate::runs::Outcome;
-use crate::runs::sharded_run::{open_any_run, open_choice_run};
-use crate::runs::stored::AnyRun;
-use crate::types::degradations::Kind;
-use crate::types::manifests::{RunManifest, Status};
-use crate::types::questions::letter;
-use crate::types::{
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::write;
+use darkqa_base::types::degradations::Kind;
+use darkqa_base::types::manifests::{RunManifest, Status};
+use darkqa_base::types::questions::letter;
+use darkqa_base::types::{
     AxisLevel, Condition, Decides, Digest, FrameId, OpenDetail, Record, Rgb, RunQuestion, TrialOutcome, Variant,
 };
+use darkqa_data::inputs::stem;
+use darkqa_data::ready_made::is_zip_file;
+use darkqa_engine::image_rebuilder::{ImageRebuilder, RebuildArgs};
+use darkqa_engine::images::notes::montage;
+use darkqa_pictures::{Payload, PayloadFormat};
+use darkqa_report::charts::figures::StoryCurves;
+use darkqa_report::charts::sheet::{Story, StoryCell, StoryMark, StoryRow, story};
+use darkqa_report::joined::story_curves;
+use darkqa_report::text::words;
+use darkqa_runs::Outcome;
+use darkqa_runs::sharded_run::{open_any_run, open_choice_run};
+use darkqa_runs::stored::AnyRun;
 use darkqa_score::model_in_condition::is_control;
 
 /// Rebuilds and writes the images of a question, and reports for each whether it equals the image sent. With `--sheet`,

@@ -9,14 +9,14 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::Value;
 
-use crate::error::{Error, Result};
-use crate::files;
-use crate::report::joined;
-use crate::report::site::{DATA, PAGES, SCHEMA, products};
-use crate::runs::Outcome;
-use crate::runs::sharded_run::open_any_run;
-use crate::types::Decides;
-use crate::types::manifests::Status;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::Decides;
+use darkqa_base::types::manifests::Status;
+use darkqa_report::joined;
+use darkqa_report::site::{DATA, PAGES, SCHEMA, products};
+use darkqa_runs::Outcome;
+use darkqa_runs::sharded_run::open_any_run;
 
 /// The flags of `site`.
 #[derive(Debug, Args)]

@@ -14,23 +14,23 @@ use clap::builder::NonEmptyStringValueParser;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use crate::engine::image_rebuilder::{ImageRebuilder, RebuildArgs};
-use crate::engine::images::progress::Progress;
-use crate::error::{Error, Result};
-use crate::files::{self, write};
-use crate::pictures::Payload;
-use crate::report::joined::written;
-use crate::report::study::{StudyImage, StudyQuestion, page};
-use crate::runs::stored::StoredRun;
-use crate::runs::{Outcome, PrintArgs, record_table};
-use crate::store::{AddressChange, Store, now, read_questions};
-use crate::types::manifests::{Counts, RunManifest, Status};
-use crate::types::text::{counted, plural};
-use crate::types::{
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{self, write};
+use darkqa_base::types::manifests::{Counts, RunManifest, Status};
+use darkqa_base::types::text::{counted, plural};
+use darkqa_base::types::{
     ChoiceDetail, Condition, Decides, Digest, FrameId, ParsedAnswer, QuestionId, Record, Reply, RunQuestion,
     StoredDetail as _, TrialKey, TrialRef, Trials, UnreadReason,
 };
+use darkqa_engine::image_rebuilder::{ImageRebuilder, RebuildArgs};
+use darkqa_engine::images::progress::Progress;
+use darkqa_pictures::Payload;
+use darkqa_report::joined::written;
+use darkqa_report::study::{StudyImage, StudyQuestion, page};
+use darkqa_runs::stored::StoredRun;
+use darkqa_runs::{Outcome, PrintArgs, record_table};
 use darkqa_score::answers::record::{Detail, answered};
+use darkqa_store::{AddressChange, Store, now, read_questions};
 
 /// The flags of `study pack`.
 #[derive(Debug, Args)]

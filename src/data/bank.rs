@@ -17,19 +17,17 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::ready_made::one_line;
-use crate::error::{Error, Result};
-use crate::files::text;
-use crate::types::evidence::BANK_ID;
-use crate::types::questions::CANNOT_TELL;
-use crate::types::text::excerpt;
-use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
-
-/// The built-in bank.
-const HOME: &str = include_str!("../../prompts/ask/home.jsonl");
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::text;
+use darkqa_base::types::evidence::BANK_ID;
+use darkqa_base::types::questions::CANNOT_TELL;
+use darkqa_base::types::text::excerpt;
+use darkqa_base::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
+use darkqa_prompts::HOME;
 
 /// Value of `--ask`: the built-in bank or a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum BankSource {
+pub enum BankSource {
     /// The built-in bank.
     Home(OptOut),
     /// A file of questions.
@@ -38,7 +36,7 @@ pub(crate) enum BankSource {
 
 /// Whether a model may answer “cannot tell” to the questions of the built-in bank.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum OptOut {
+pub enum OptOut {
     /// Every choice describes the photograph.
     None,
     /// “Cannot tell” is added as the last choice.
@@ -90,7 +88,7 @@ struct BankLine {
 
 /// Questions of a bank. Ids and texts are unique.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Bank {
+pub struct Bank {
     questions: Vec<BankQuestion>,
 }
 
@@ -99,7 +97,7 @@ impl Bank {
     ///
     /// # Errors
     /// If the file cannot be read or a line is invalid; the error names the file and the line.
-    pub(crate) fn open(place: &BankSource) -> Result<Self> {
+    pub fn open(place: &BankSource) -> Result<Self> {
         match place {
             BankSource::Home(opt_out) => Self::parse(HOME, Path::new("home"), *opt_out),
             BankSource::File(path) if !path.exists() => Err(Error::usage(
@@ -139,7 +137,7 @@ impl Bank {
     ///
     /// # Errors
     /// None in practice: the questions are text.
-    pub(crate) fn digest(&self) -> Result<Digest> {
+    pub fn digest(&self) -> Result<Digest> {
         let lines: Vec<Value> = self
             .questions
             .iter()
@@ -149,7 +147,7 @@ impl Bank {
     }
 
     /// Number of questions.
-    pub(crate) fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.questions.len()
     }
 
@@ -158,7 +156,7 @@ impl Bank {
     /// `per_image` limits the questions about each photograph to those with the lowest digest of the photograph's name
     /// and the question. The rank of two questions therefore does not depend on other photographs, other questions or
     /// the order of the bank.
-    pub(crate) fn questions_about<'f>(
+    pub fn questions_about<'f>(
         &self,
         frames: impl IntoIterator<Item = &'f FrameId>,
         per_image: Option<NonZeroUsize>,
@@ -282,7 +280,7 @@ mod tests {
     fn built_in_bank_has_25_questions_with_and_without_opt_out() {
         let home = Bank::open(&"home".parse().unwrap()).unwrap();
         let uncertain = Bank::open(&"home:uncertain".parse().unwrap()).unwrap();
-        assert_eq!((home.len(), uncertain.len()), (25, 25));
+        assert_eq!((home.count(), uncertain.count()), (25, 25));
         assert_eq!(home.questions.iter().filter(|question| question.family == Family::Presence).count(), 15);
         for (bare, with_opt_out) in home.questions.iter().zip(&uncertain.questions) {
             assert!(!bare.choices.texts().iter().any(|text| text.contains("cannot")));

@@ -5,17 +5,17 @@ use std::path::PathBuf;
 
 use serde::Deserialize;
 
-use crate::types::PhotoName;
+use darkqa_base::types::PhotoName;
 
 /// Photograph of a frame's scene in the dark.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct DarkPhoto {
+pub struct DarkPhoto {
     /// Name of the condition that shows the photograph.
-    pub(crate) name: PhotoName,
+    pub name: PhotoName,
     /// Image file.
-    pub(crate) path: PathBuf,
+    pub path: PathBuf,
     /// Difference in exposure from the frame (shutter time and gain), in EV, positive if darker; `None` if unknown.
-    pub(crate) ev: Option<f64>,
+    pub ev: Option<f64>,
 }
 
 /// Value of `dark` in a line of `frames.jsonl`: a path, an object, or a list of these.

@@ -9,11 +9,11 @@ use super::maps::{FrameFacts, FrameFiles, MapPaths, Picture};
 use super::openeqa::ImageSource;
 use super::ready_made::{FileQuestions, LEFT_OUT, ReadySet, RowCounts, SceneNames, Series, SetFormat, SkipBad};
 use super::root::folded;
-use crate::error::{Error, Result};
-use crate::pictures::{DecodeRule, ImageFile};
-use crate::rooms::{self, Rooms};
-use crate::types::text::excerpt;
-use crate::types::{Frame, FrameId, Labels, PhotoName, Question};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::text::excerpt;
+use darkqa_base::types::{Frame, FrameId, Labels, PhotoName, Question};
+use darkqa_pictures::{DecodeRule, ImageFile};
+use darkqa_rooms::Rooms;
 
 /// Images and the questions about them.
 #[derive(Debug)]
@@ -21,7 +21,7 @@ pub struct Dataset {
     name: String,
     /// The `name` in `dataset.json`; empty if there is none.
     title: String,
-    pub(crate) sources: BTreeMap<FrameId, ImageSource>,
+    pub sources: BTreeMap<FrameId, ImageSource>,
     /// Frames of each question with several images, by the name that stands for all of them in [`Question::frame`].
     series: Series,
     /// Scenes that the questions assign to their frames. They take precedence over the scenes of the frames.
@@ -57,7 +57,7 @@ impl Dataset {
         let sources = rooms.all().map(|(id, room)| (id, ImageSource::Room(room))).collect();
         Self {
             title: rooms.title(),
-            labels: Some(rooms::labels()),
+            labels: Some(darkqa_rooms::labels()),
             ..Self::new("rooms".to_owned(), sources, Vec::new())
         }
     }
@@ -94,7 +94,7 @@ impl Dataset {
 
     /// Takes the questions out, to avoid a second copy of a large set.
     #[must_use]
-    pub(crate) fn take_questions(&mut self) -> Vec<Question> {
+    pub fn take_questions(&mut self) -> Vec<Question> {
         std::mem::take(&mut self.questions)
     }
 
@@ -150,7 +150,7 @@ impl Dataset {
     /// Frames that a question about `frame` shows, in order: `frame` itself, or each image of a question with several
     /// images.
     #[must_use]
-    pub(crate) fn shown_frames<'a>(&'a self, frame: &'a FrameId) -> &'a [FrameId] {
+    pub fn shown_frames<'a>(&'a self, frame: &'a FrameId) -> &'a [FrameId] {
         match self.series.get(frame) {
             Some(frames) => frames,
             None => std::slice::from_ref(frame),
@@ -159,13 +159,13 @@ impl Dataset {
 
     /// Frames of a question with several images, in order; empty for a question with one image.
     #[must_use]
-    pub(crate) fn image_series(&self, frame: &FrameId) -> &[FrameId] {
+    pub fn image_series(&self, frame: &FrameId) -> &[FrameId] {
         self.series.get(frame).map_or(&[], Vec::as_slice)
     }
 
     /// True if the data set has the frame, or every frame of a question with several images.
     #[must_use]
-    pub(crate) fn has_frames(&self, frame: &FrameId) -> bool {
+    pub fn has_frames(&self, frame: &FrameId) -> bool {
         self.shown_frames(frame).iter().all(|frame| self.sources.contains_key(frame))
     }
 
@@ -241,7 +241,7 @@ impl Dataset {
 
     /// Photographs of the frame's scene in the dark, in the order of the data.
     #[must_use]
-    pub(crate) fn photographs(&self, frame: &FrameId) -> &[DarkPhoto] {
+    pub fn photographs(&self, frame: &FrameId) -> &[DarkPhoto] {
         match self.sources.get(frame) {
             Some(ImageSource::File(file)) => &file.dark,
             _ => &[],
@@ -252,7 +252,7 @@ impl Dataset {
     ///
     /// # Errors
     /// If the frame has no photograph of this name, or its file cannot be read.
-    pub(crate) fn photograph(&self, frame: &FrameId, name: &PhotoName) -> Result<Picture> {
+    pub fn photograph(&self, frame: &FrameId, name: &PhotoName) -> Result<Picture> {
         let Some(photo) = self.photographs(frame).iter().find(|photo| photo.name == *name) else {
             let problem = format_args!("no photograph {name} of the frame {:?} in it", frame.0);
             return Err(Error::data(&self.name, problem));
@@ -302,7 +302,7 @@ impl Dataset {
     }
 
     /// Images that the questions show, without duplicates; all images if there are no questions.
-    pub(crate) fn shown_images(&self) -> Vec<&FrameId> {
+    pub fn shown_images(&self) -> Vec<&FrameId> {
         if self.questions.is_empty() {
             return self.sources.keys().collect();
         }
@@ -318,7 +318,7 @@ impl Dataset {
     ///
     /// # Errors
     /// If one of them cannot be decoded; the error names its file.
-    pub(crate) fn decode_all(&self, frame: &FrameId) -> Result<()> {
+    pub fn decode_all(&self, frame: &FrameId) -> Result<()> {
         self.picture(frame)?.decode()?;
         for photograph in self.photographs(frame) {
             self.photograph(frame, &photograph.name)?.decode()?;
@@ -330,7 +330,7 @@ impl Dataset {
     ///
     /// # Errors
     /// If more is left out than `skip` allows, including broken rows.
-    pub(crate) fn without_unusable(mut self, unusable: &BTreeMap<FrameId, String>, skip: SkipBad) -> Result<Self> {
+    pub fn without_unusable(mut self, unusable: &BTreeMap<FrameId, String>, skip: SkipBad) -> Result<Self> {
         let Some(first) = unusable.values().next() else {
             return Ok(self);
         };

@@ -1,4 +1,4 @@
-//! Writer of a folder of frames in the format that [`crate::data::frames`] reads: [`FrameOutput`].
+//! Writer of a folder of frames in the format that [`crate::frames`] reads: [`FrameOutput`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,22 +6,22 @@ use std::path::Path;
 use ndarray::Array2;
 use serde_json::{Map, Value, json};
 
-use crate::error::{Error, Result};
-use crate::files::write;
-use crate::labels;
-use crate::pictures::grey_png;
-use crate::types::{DepthKind, Labels, SegmentName, Segmentation};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::write;
+use darkqa_base::labels;
+use darkqa_base::types::{DepthKind, Labels, SegmentName, Segmentation};
+use darkqa_pictures::grey_png;
 
 /// File that lists the frames.
-pub(crate) const FRAMES: &str = "frames.jsonl";
+pub const FRAMES: &str = "frames.jsonl";
 
 /// Writes the files of one frame.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct FrameOutput<'a> {
+pub struct FrameOutput<'a> {
     /// Output folder of all frames.
-    pub(crate) out: &'a Path,
-    pub(crate) scene: &'a str,
-    pub(crate) frame: &'a str,
+    pub out: &'a Path,
+    pub scene: &'a str,
+    pub frame: &'a str,
 }
 
 /// One line of `frames.jsonl`.
@@ -29,7 +29,7 @@ type ListLine = Map<String, Value>;
 
 impl FrameOutput<'_> {
     /// Starts the line of the frame with its scene, name, width and height.
-    pub(crate) fn line(&self, width: usize, height: usize) -> ListLine {
+    pub fn line(&self, width: usize, height: usize) -> ListLine {
         let facts = [
             ("scene", json!(self.scene)),
             ("frame", json!(self.frame)),
@@ -40,14 +40,14 @@ impl FrameOutput<'_> {
     }
 
     /// Writes one file of the frame, and returns its path relative to the output folder.
-    pub(crate) fn write(&self, kind: &str, ending: &str, bytes: &[u8]) -> Result<String> {
+    pub fn write(&self, kind: &str, ending: &str, bytes: &[u8]) -> Result<String> {
         let path = format!("scenes/{}/{kind}/{}.{ending}", self.scene, self.frame);
         write(&self.out.join(&path), bytes)?;
         Ok(path)
     }
 
     /// Writes the depth in millimetres as a 16-bit PNG, and adds it to the line.
-    pub(crate) fn write_depth(&self, line: &mut ListLine, depth: &Array2<u32>, kind: DepthKind) -> Result<()> {
+    pub fn write_depth(&self, line: &mut ListLine, depth: &Array2<u32>, kind: DepthKind) -> Result<()> {
         let units = depth.mapv(|depth| u16::try_from(depth).unwrap_or(u16::MAX));
         let path = self.write("depth", "png", &grey16_png(&units)?)?;
         line.insert("depth".to_owned(), json!(path));
@@ -57,14 +57,14 @@ impl FrameOutput<'_> {
     }
 
     /// Writes the class of each pixel as a 16-bit PNG, and adds it to the line.
-    pub(crate) fn write_semantic(&self, line: &mut ListLine, semantic: &Array2<u16>) -> Result<()> {
+    pub fn write_semantic(&self, line: &mut ListLine, semantic: &Array2<u16>) -> Result<()> {
         let path = self.write("sem", "png", &grey16_png(semantic)?)?;
         line.insert("sem".to_owned(), json!(path));
         Ok(())
     }
 
     /// Writes the segments as a 16-bit PNG, or as `.npy` if an id needs more than 16 bits, and adds them to the line.
-    pub(crate) fn write_segments(
+    pub fn write_segments(
         &self,
         line: &mut ListLine,
         segments: &Array2<u32>,
@@ -87,7 +87,7 @@ impl FrameOutput<'_> {
 }
 
 /// Writes the names of the segments of a scene; no file if there are none.
-pub(crate) fn write_segment_names(out: &Path, scene: &str, names: &BTreeMap<u32, SegmentName>) -> Result<()> {
+pub fn write_segment_names(out: &Path, scene: &str, names: &BTreeMap<u32, SegmentName>) -> Result<()> {
     if names.is_empty() {
         return Ok(());
     }
@@ -97,7 +97,7 @@ pub(crate) fn write_segment_names(out: &Path, scene: &str, names: &BTreeMap<u32,
 }
 
 /// Writes the files about the whole folder. The list of frames comes last, because it marks the folder as complete.
-pub(crate) fn write_folder_files<'a>(
+pub fn write_folder_files<'a>(
     out: &Path,
     labels: &Labels,
     info: &Value,

@@ -8,7 +8,7 @@
 //!   `superpixel` (parts). Also optional: `depth_kind` (`planar` or `euclid`), `intrinsics` (`{"fx", "fy", "cx",
 //!   "cy"}`), `room_gt`, `t` (seconds) and `pose`; and `dark`, photographs of the same scene in the dark: a path,
 //!   `{"path", "ev", "name"}`, or a list of them ([`dark_photos`](super::dark_photos)).
-//! - `classes.json`: the class of each number in `sem` ([`crate::labels`]).
+//! - `classes.json`: the class of each number in `sem` ([`darkqa_base::labels`]).
 //! - `dataset.json`: `{"schema": "darkqa.dataset/1", "name", "depth_kind", "light"}`; the last three are optional.
 //!   `light` is `lit`, or `dark` for photographs that were taken in the dark.
 //! - `scenes/<scene>/segments.json`: the segments that have names, `{"7": {"name", "canonical", "region"}}`.
@@ -31,12 +31,12 @@ use super::maps::{DepthFile, FrameFacts, MapPaths};
 use super::openeqa::{FrameFile, ImageSource};
 use super::ready_made::{self, SetArgs, SkipBad};
 use super::root::Root;
-use crate::error::{Error, Result};
-use crate::files::{entries, json, json_lines};
-use crate::labels;
-use crate::pictures::image_file::format::SUPPORTED_FORMATS;
-use crate::types::images::is_image_ending;
-use crate::types::{DepthKind, FrameId, Intrinsics, Labels, SegmentName, Segmentation, SetLight};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{entries, json, json_lines};
+use darkqa_base::labels;
+use darkqa_base::types::images::is_image_ending;
+use darkqa_base::types::{DepthKind, FrameId, Intrinsics, Labels, SegmentName, Segmentation, SetLight};
+use darkqa_pictures::image_file::format::SUPPORTED_FORMATS;
 
 /// File that lists the frames.
 pub(super) const FRAMES: &str = "frames.jsonl";
@@ -157,7 +157,7 @@ impl FrameFields {
 
 /// Opens an image file or a folder of frames, without questions. Paths may also lead into the folders in `further`.
 /// No image is read.
-pub(crate) fn open_images(path: &Path, further: &[PathBuf]) -> Result<Dataset> {
+pub fn open_images(path: &Path, further: &[PathBuf]) -> Result<Dataset> {
     let sources = if path.is_dir() {
         let sources = sources(path, further, MissingFiles::Refuse)?;
         if !path.join(FRAMES).exists() {
@@ -402,14 +402,14 @@ const UNSUPPORTED: [&str; 28] = [
 ];
 
 /// Image files in supported and in unsupported formats.
-pub(crate) struct ImagePaths {
+pub struct ImagePaths {
     pub(super) images: Vec<PathBuf>,
     unsupported: Vec<PathBuf>,
 }
 
 impl ImagePaths {
     /// Sorts paths by their extensions. Folders and other files are left out.
-    pub(crate) fn from_paths(paths: impl IntoIterator<Item = PathBuf>) -> Self {
+    pub fn from_paths(paths: impl IntoIterator<Item = PathBuf>) -> Self {
         let (mut images, mut unsupported) = (Vec::new(), Vec::new());
         for path in paths {
             if is_image(&path) {
@@ -434,7 +434,7 @@ impl ImagePaths {
     }
 
     /// Warns if the folder has images in unsupported formats.
-    pub(crate) fn warn_of_unsupported(&self, folder: &Path) {
+    pub fn warn_of_unsupported(&self, folder: &Path) {
         if let Some(note) = self.unsupported_note() {
             tracing::warn!("{}: {note}", folder.display());
         }
@@ -442,7 +442,7 @@ impl ImagePaths {
 }
 
 /// True if the path is a file with the extension of a supported image format.
-pub(crate) fn is_image(path: &Path) -> bool {
+pub fn is_image(path: &Path) -> bool {
     is_file_with_extension(path, is_image_ending)
 }
 

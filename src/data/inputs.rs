@@ -6,23 +6,23 @@ use std::path::{Component, Path, PathBuf};
 use super::dataset::Dataset;
 use super::frames::open_images;
 use super::maps::Picture;
-use crate::error::{Error, Result};
-use crate::pictures::DecodeRule;
-use crate::types::FrameId;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::FrameId;
+use darkqa_pictures::DecodeRule;
 
 /// Frames of all input files and folders.
-pub(crate) struct Inputs {
+pub struct Inputs {
     sets: Vec<Dataset>,
-    pub(crate) entries: Vec<InputFrame>,
+    pub entries: Vec<InputFrame>,
 }
 
 /// Frame with the name of its output files.
-pub(crate) struct InputFrame {
+pub struct InputFrame {
     /// Index of its data set in [`Inputs`].
     set: usize,
-    pub(crate) id: FrameId,
+    pub id: FrameId,
     /// Path relative to the output folder, without the file extension.
-    pub(crate) stem: String,
+    pub stem: String,
 }
 
 impl Inputs {
@@ -30,7 +30,7 @@ impl Inputs {
     ///
     /// # Errors
     /// If an input is missing, two frames would have the same output name, or a name leads outside the output folder.
-    pub(crate) fn open(inputs: &[PathBuf], further: &[PathBuf], rule: DecodeRule) -> Result<Self> {
+    pub fn open(inputs: &[PathBuf], further: &[PathBuf], rule: DecodeRule) -> Result<Self> {
         let sets: Vec<Dataset> =
             inputs.iter().map(|path| Ok(open_images(path, further)?.with_rule(rule))).collect::<Result<_>>()?;
         let mut entries = Vec::new();
@@ -52,12 +52,12 @@ impl Inputs {
         Ok(Self { sets, entries })
     }
 
-    pub(crate) fn picture(&self, entry: &InputFrame) -> Result<Picture> {
+    pub fn picture(&self, entry: &InputFrame) -> Result<Picture> {
         self.sets[entry.set].picture(&entry.id)
     }
 
     /// Horizontal focal length of a frame, in pixels of its image; `None` if unknown.
-    pub(crate) fn focal(&self, entry: &InputFrame) -> Option<f64> {
+    pub fn focal(&self, entry: &InputFrame) -> Option<f64> {
         self.sets[entry.set].focal(&entry.id)
     }
 }
@@ -66,7 +66,7 @@ impl Inputs {
 ///
 /// # Errors
 /// If the name leads outside the output folder.
-pub(crate) fn stem(id: &FrameId) -> Result<String> {
+pub fn stem(id: &FrameId) -> Result<String> {
     let path = Path::new(&id.0);
     if !path.components().all(|part| matches!(part, Component::Normal(_))) {
         let problem = "this name of a frame leads out of the output folder";

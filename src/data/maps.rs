@@ -17,15 +17,17 @@ use std::sync::Arc;
 use ndarray::Array2;
 use serde::{Serialize, Serializer};
 
-use crate::error::{Error, Result};
-use crate::files;
-use crate::pictures::decode_rule::MAX_PIXELS;
-use crate::pictures::image_file::StatedOrientation;
-use crate::pictures::npy::Npy;
-use crate::pictures::raw_png::{RawPng, SampleForm};
-use crate::pictures::{DecodeRule, ImageFile};
-use crate::rooms::Room;
-use crate::types::{DepthKind, Digest, Frame, FrameId, InputNote, Intrinsics, Pixels, Rgb, SegmentName, Segmentation};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::{
+    DepthKind, Digest, Frame, FrameId, InputNote, Intrinsics, Pixels, Rgb, SegmentName, Segmentation,
+};
+use darkqa_pictures::decode_rule::MAX_PIXELS;
+use darkqa_pictures::image_file::StatedOrientation;
+use darkqa_pictures::npy::Npy;
+use darkqa_pictures::raw_png::{RawPng, SampleForm};
+use darkqa_pictures::{DecodeRule, ImageFile};
+use darkqa_rooms::Room;
 
 /// Maximum depth of a pixel, in millimetres: a kilometre, deeper than any room (chosen). A larger value means a wrong
 /// unit, such as millimetres read as metres.
@@ -33,17 +35,17 @@ const MAX_DEPTH_MM: f64 = 1e6;
 
 /// Paths of the maps that a frame has.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct MapPaths {
-    pub(crate) depth: Option<DepthFile>,
+pub struct MapPaths {
+    pub depth: Option<DepthFile>,
     /// Class of each pixel: a PNG file of 8-bit grey, 16-bit grey or palette indices.
-    pub(crate) semantic: Option<PathBuf>,
+    pub semantic: Option<PathBuf>,
     /// Segment of each pixel, 0 for none: a 16-bit grey PNG file, or a `.npy` file of integers.
-    pub(crate) segments: Option<PathBuf>,
+    pub segments: Option<PathBuf>,
 }
 
 /// File of a depth map.
 #[derive(Debug, Clone)]
-pub(crate) enum DepthFile {
+pub enum DepthFile {
     /// 16-bit grey PNG file; 0 means no depth.
     Png {
         path: PathBuf,
@@ -56,7 +58,7 @@ pub(crate) enum DepthFile {
 
 impl DepthFile {
     /// The depth file at `path`; `scale` is the `depth_scale` of the frame.
-    pub(crate) fn new(path: PathBuf, scale: Option<f64>) -> Result<Self, String> {
+    pub fn new(path: PathBuf, scale: Option<f64>) -> Result<Self, String> {
         match (is_npy(&path), scale) {
             (true, None | Some(1.0)) => Ok(Self::Npy(path)),
             (true, Some(scale)) => {
@@ -79,7 +81,7 @@ impl DepthFile {
     }
 
     /// Decodes the depth in millimetres, whatever the size of the map.
-    pub(crate) fn decode_any_size(&self, bytes: &[u8]) -> Result<Array2<u32>, String> {
+    pub fn decode_any_size(&self, bytes: &[u8]) -> Result<Array2<u32>, String> {
         let size = match self {
             Self::Png { .. } => RawPng::open(bytes, &[SampleForm::Grey16], MAX_PIXELS)?.size,
             Self::Npy(_) => Npy::parse(bytes)?.size,
@@ -112,7 +114,7 @@ impl DepthFile {
 
 impl MapPaths {
     /// Paths of all map files.
-    pub(crate) fn paths(&self) -> impl Iterator<Item = PathBuf> {
+    pub fn paths(&self) -> impl Iterator<Item = PathBuf> {
         self.depth
             .iter()
             .map(|depth| depth.path().to_owned())
@@ -120,7 +122,7 @@ impl MapPaths {
     }
 
     /// A frame without maps.
-    pub(crate) const NONE: Self = Self { depth: None, semantic: None, segments: None };
+    pub const NONE: Self = Self { depth: None, semantic: None, segments: None };
 
     /// True if the frame has no maps.
     pub(super) fn is_empty(&self) -> bool {
@@ -181,7 +183,7 @@ impl MapPaths {
     ///
     /// # Errors
     /// If a file cannot be read; the error names it.
-    pub(crate) fn read(&self) -> Result<MapFiles<'_>> {
+    pub fn read(&self) -> Result<MapFiles<'_>> {
         Ok(MapFiles {
             maps: self,
             depth: optional_bytes(self.depth.as_ref().map(DepthFile::path))?,
@@ -197,7 +199,7 @@ fn optional_bytes(path: Option<&Path>) -> Result<Option<Vec<u8>>> {
 
 /// Bytes of a frame's map files.
 #[derive(Debug)]
-pub(crate) struct MapFiles<'a> {
+pub struct MapFiles<'a> {
     maps: &'a MapPaths,
     depth: Option<Vec<u8>>,
     semantic: Option<Vec<u8>>,
@@ -206,7 +208,7 @@ pub(crate) struct MapFiles<'a> {
 
 impl MapFiles<'_> {
     /// Digest of the files and of the unit of depth.
-    pub(crate) fn digest(&self) -> Digest {
+    pub fn digest(&self) -> Digest {
         let unit = match &self.maps.depth {
             Some(DepthFile::Png { scale, .. }) => scale.to_string(),
             Some(DepthFile::Npy(_)) => "m".to_owned(),
@@ -221,7 +223,7 @@ impl MapFiles<'_> {
     ///
     /// # Errors
     /// If the file has another format, another size than the image, or an impossible value; the error names it.
-    pub(crate) fn depth(&self, size: Size) -> Result<Option<Array2<u32>>> {
+    pub fn depth(&self, size: Size) -> Result<Option<Array2<u32>>> {
         let Some((file, bytes)) = self.maps.depth.as_ref().zip(self.depth.as_ref()) else {
             return Ok(None);
         };
@@ -232,7 +234,7 @@ impl MapFiles<'_> {
     ///
     /// # Errors
     /// As [`Self::depth`].
-    pub(crate) fn semantic(&self, size: Size) -> Result<Option<Array2<u16>>> {
+    pub fn semantic(&self, size: Size) -> Result<Option<Array2<u16>>> {
         let Some((path, bytes)) = self.maps.semantic.as_ref().zip(self.semantic.as_ref()) else {
             return Ok(None);
         };
@@ -243,7 +245,7 @@ impl MapFiles<'_> {
     ///
     /// # Errors
     /// As [`Self::depth`].
-    pub(crate) fn segments(&self, size: Size) -> Result<Option<Array2<u32>>> {
+    pub fn segments(&self, size: Size) -> Result<Option<Array2<u32>>> {
         let Some((path, bytes)) = self.maps.segments.as_ref().zip(self.segments.as_ref()) else {
             return Ok(None);
         };
@@ -274,7 +276,7 @@ fn segment_id(id: i128) -> Result<u32, String> {
 }
 
 /// Converts a depth to whole millimetres, rounded half to even; 0 if there is no depth. `unit` is millimetres per unit.
-pub(crate) fn millimetres(units: f64, unit: f64) -> Result<u32, String> {
+pub fn millimetres(units: f64, unit: f64) -> Result<u32, String> {
     if !units.is_finite() || units <= 0.0 {
         return Ok(0);
     }
@@ -329,14 +331,14 @@ fn collect_grid<T>(size: Size, values: impl Iterator<Item = Result<T, String>>) 
 
 /// Metadata of a frame: scene, camera, names of segments, room.
 #[derive(Debug, Clone, Default, Serialize)]
-pub(crate) struct FrameFacts {
-    pub(crate) scene: String,
-    pub(crate) depth_kind: DepthKind,
-    pub(crate) intrinsics: Option<Intrinsics>,
-    pub(crate) segmentation: Segmentation,
+pub struct FrameFacts {
+    pub scene: String,
+    pub depth_kind: DepthKind,
+    pub intrinsics: Option<Intrinsics>,
+    pub segmentation: Segmentation,
     #[serde(serialize_with = "serialize_as_pairs")]
-    pub(crate) names: Arc<BTreeMap<u32, SegmentName>>,
-    pub(crate) room: Option<String>,
+    pub names: Arc<BTreeMap<u32, SegmentName>>,
+    pub room: Option<String>,
 }
 
 /// Serializes a map as a list of pairs, because keys of a JSON object must be strings.
@@ -350,10 +352,10 @@ fn serialize_as_pairs<S: Serializer>(
 /// Files of a frame, not decoded.
 #[derive(Debug)]
 pub struct FrameFiles<'a> {
-    pub(crate) id: &'a FrameId,
-    pub(crate) picture: Picture,
-    pub(crate) maps: MapFiles<'a>,
-    pub(crate) facts: &'a FrameFacts,
+    pub id: &'a FrameId,
+    pub picture: Picture,
+    pub maps: MapFiles<'a>,
+    pub facts: &'a FrameFacts,
 }
 
 impl FrameFiles<'_> {

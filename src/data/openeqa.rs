@@ -13,14 +13,13 @@ use super::Root;
 use super::dark_photos::DarkPhoto;
 use super::maps::{FrameFacts, MapPaths};
 use super::ready_made::{Archive, EmbeddedImage};
-use crate::error::{Error, Result};
-use crate::files::bytes;
-use crate::rooms;
-use crate::types::QuestionId;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::bytes;
+use darkqa_base::types::QuestionId;
 
 /// Open question about a walk through a building.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-pub(crate) struct OpenQuestion {
+pub struct OpenQuestion {
     #[serde(rename = "question_id")]
     pub id: QuestionId,
     #[serde(rename = "question")]
@@ -39,7 +38,7 @@ pub(crate) struct OpenQuestion {
 impl OpenQuestion {
     /// Split of the question: the first part of the name of its walk, such as `hm3d-v0`.
     #[must_use]
-    pub(crate) fn split(&self) -> &str {
+    pub fn split(&self) -> &str {
         self.episode.split('/').next().unwrap_or_default()
     }
 }
@@ -48,7 +47,7 @@ impl OpenQuestion {
 ///
 /// # Errors
 /// If the file cannot be read, is not such an array, is empty, or has two questions with the same id.
-pub(crate) fn read_questions(path: &Path) -> Result<Vec<OpenQuestion>> {
+pub fn read_questions(path: &Path) -> Result<Vec<OpenQuestion>> {
     let text = bytes(path)?;
     let questions: Vec<OpenQuestion> = serde_json::from_slice(&text).map_err(|e| {
         Error::data(
@@ -72,7 +71,7 @@ pub(crate) fn read_questions(path: &Path) -> Result<Vec<OpenQuestion>> {
 ///
 /// # Errors
 /// If the folder is missing or has no such file, or if the folder or a frame lies outside `root`.
-pub(crate) fn walk_frames(root: &Root, episode: &str) -> Result<Vec<PathBuf>> {
+pub fn walk_frames(root: &Root, episode: &str) -> Result<Vec<PathBuf>> {
     let folder =
         root.path(root.folder(), Path::new(episode)).map_err(|problem| Error::data("episode_history", problem))?;
     let mut links_out = Vec::new();
@@ -93,7 +92,7 @@ pub(crate) fn walk_frames(root: &Root, episode: &str) -> Result<Vec<PathBuf>> {
 /// Indices of `k` frames out of `n`, like `np.round(np.linspace(0, n - 1, k))`: rounded half to even, with repeats if
 /// `n` is less than `k`; empty if `n` is 0.
 #[must_use]
-pub(crate) fn sample_indices(n: usize, k: usize) -> Vec<usize> {
+pub fn sample_indices(n: usize, k: usize) -> Vec<usize> {
     if n == 0 {
         return Vec::new();
     }
@@ -110,7 +109,7 @@ pub(crate) fn sample_indices(n: usize, k: usize) -> Vec<usize> {
 
 /// Location of one image and its maps.
 #[derive(Debug, Clone)]
-pub(crate) enum ImageSource {
+pub enum ImageSource {
     /// An image file.
     File(Box<FrameFile>),
     /// An image in a ZIP file, under the name of the frame.
@@ -118,16 +117,16 @@ pub(crate) enum ImageSource {
     /// An image inside a table.
     Embedded(EmbeddedImage),
     /// A frame of the built-in rooms.
-    Room(rooms::Room),
+    Room(darkqa_rooms::Room),
 }
 
 /// Image file of a frame, with its maps, metadata and photographs of its scene in the dark.
 #[derive(Debug, Clone)]
-pub(crate) struct FrameFile {
-    pub(crate) rgb: PathBuf,
-    pub(crate) maps: MapPaths,
-    pub(crate) facts: FrameFacts,
-    pub(crate) dark: Vec<DarkPhoto>,
+pub struct FrameFile {
+    pub rgb: PathBuf,
+    pub maps: MapPaths,
+    pub facts: FrameFacts,
+    pub dark: Vec<DarkPhoto>,
 }
 
 impl ImageSource {

@@ -11,15 +11,15 @@ use super::frames::ImagePaths;
 use super::maps::{FrameFacts, MapPaths};
 use super::openeqa::{FrameFile, ImageSource};
 use super::root::Root;
-use crate::error::{Error, Result};
-use crate::types::{FrameId, PhotoName};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::{FrameId, PhotoName};
 
 /// Names of the normal-light and the low-light folder: plain words, and the names in the LOL and LISU data sets.
 const FOLDERS: [[&str; 2]; 3] = [["normal", "low"], ["high", "low"], ["val_rgb_h", "val_rgb_l"]];
 
 /// One scene in normal and in low light.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Pair {
+pub struct Pair {
     /// The common part of both file names.
     pub name: String,
     /// The image in normal light.
@@ -30,7 +30,7 @@ pub(crate) struct Pair {
 
 /// The image pairs of a data set.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Pairs {
+pub struct Pairs {
     /// Sorted by name.
     pub pairs: Vec<Pair>,
     /// Images without a partner.
@@ -53,7 +53,7 @@ impl Pairs {
     /// # Errors
     /// If no pair is found, or two images of the same side have the same name. `other_folders` is the command's way to
     /// name two folders.
-    pub(crate) fn open(folder: &Path, further: &[PathBuf], other_folders: &str) -> Result<Self> {
+    pub fn open(folder: &Path, further: &[PathBuf], other_folders: &str) -> Result<Self> {
         let root = Root::new(folder, further)?;
         let mut links_out = Vec::new();
         let entries = root.entries(folder, &mut links_out)?;
@@ -84,7 +84,7 @@ impl Pairs {
     ///
     /// # Errors
     /// If no pair is found, or two images of the same folder have the same name.
-    pub(crate) fn from_folders(normal: &Path, low: &Path, further: &[PathBuf]) -> Result<Self> {
+    pub fn from_folders(normal: &Path, low: &Path, further: &[PathBuf]) -> Result<Self> {
         let mut sides = [BTreeMap::new(), BTreeMap::new()];
         for (side, folder) in sides.iter_mut().zip([normal, low]) {
             let root = Root::new(folder, further)?;

@@ -8,17 +8,17 @@ use super::frames::{self, ImagePaths, MissingFiles, is_image, open_images};
 use super::ready_made::SetArgs;
 use super::root::Root;
 use super::source::{DataSource, is_lerobot_set, with_import_hint};
-use crate::error::{Error, Result};
-use crate::pictures::image_file::format::SUPPORTED_FORMATS;
-use crate::types::text::counted;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::text::counted;
+use darkqa_pictures::image_file::format::SUPPORTED_FORMATS;
 
 /// Images at a place, for questions that are asked about every image.
 #[derive(Debug)]
-pub(crate) struct Photographs {
+pub struct Photographs {
     /// Images without questions.
-    pub(crate) dataset: Dataset,
+    pub dataset: Dataset,
     /// Messages for the user: ignored questions, and how images are named.
-    pub(crate) notes: Vec<String>,
+    pub notes: Vec<String>,
 }
 
 impl Photographs {
@@ -33,7 +33,7 @@ impl Photographs {
     ///
     /// # Errors
     /// If the place cannot be read, or has no image.
-    pub(crate) fn open(place: &DataSource, set: &SetArgs) -> Result<Self> {
+    pub fn open(place: &DataSource, set: &SetArgs) -> Result<Self> {
         Self::open_place(place, set).map_err(|e| with_import_hint(place.path(), e))
     }
 

@@ -15,9 +15,9 @@ use clap::Args;
 use percent_encoding::percent_decode_str;
 use unicode_normalization::UnicodeNormalization as _;
 
-use crate::error::{Error, Result};
-use crate::files::{self, entries};
-use crate::types::{Decides, FrameId, shell_word};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{self, entries};
+use darkqa_base::types::{Decides, FrameId, shell_word};
 
 /// Flag for further folders with files of the data.
 #[derive(Debug, Clone, Default, Args)]
@@ -38,7 +38,7 @@ const DEVICES: [&str; 22] = [
 
 /// Folder of a data set, and further folders that the user allows.
 #[derive(Debug, Clone)]
-pub(crate) struct Root {
+pub struct Root {
     folder: PathBuf,
     /// The folder as an absolute path without `.` and `..`.
     absolute: PathBuf,
@@ -51,7 +51,7 @@ pub(crate) struct Root {
 
 /// Location of a path relative to the allowed folders, following links.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Location {
+pub enum Location {
     /// Below one of the folders.
     Inside,
     /// Outside all folders.
@@ -65,7 +65,7 @@ impl Root {
     ///
     /// # Errors
     /// If one of the folders does not exist.
-    pub(crate) fn new(folder: &Path, further: &[PathBuf]) -> Result<Self> {
+    pub fn new(folder: &Path, further: &[PathBuf]) -> Result<Self> {
         let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
         let (mut canonical, mut unresolved) = (Vec::new(), Vec::new());
         let folders = std::iter::once(folder).chain(further.iter().map(PathBuf::as_path));
@@ -87,7 +87,7 @@ impl Root {
     }
 
     /// Folder of the data, as given.
-    pub(crate) fn folder(&self) -> &Path {
+    pub fn folder(&self) -> &Path {
         &self.folder
     }
 
@@ -99,7 +99,7 @@ impl Root {
     ///
     /// # Errors
     /// As [`Self::file`].
-    pub(crate) fn image(&self, base: &Path, spelled: &str) -> Result<(FrameId, PathBuf), String> {
+    pub fn image(&self, base: &Path, spelled: &str) -> Result<(FrameId, PathBuf), String> {
         let file = self.file(base, Path::new(spelled))?;
         let absolute = without_dots(&absolute(&base.join(spelled)));
         let normalized = match absolute.strip_prefix(&self.absolute) {
@@ -118,7 +118,7 @@ impl Root {
     /// # Errors
     /// If the name is not a path, leads outside the folders, or the file does not exist. The error does not reveal
     /// whether a file outside the folders exists.
-    pub(crate) fn file(&self, base: &Path, spelled: &Path) -> Result<PathBuf, String> {
+    pub fn file(&self, base: &Path, spelled: &Path) -> Result<PathBuf, String> {
         let path = self.path(base, spelled)?;
         if path.is_file() {
             return Ok(path);
@@ -138,7 +138,7 @@ impl Root {
     ///
     /// # Errors
     /// If the name is not a path, or leads outside the folders.
-    pub(crate) fn path(&self, base: &Path, spelled: &Path) -> Result<PathBuf, String> {
+    pub fn path(&self, base: &Path, spelled: &Path) -> Result<PathBuf, String> {
         check_name(spelled)?;
         let path = base.join(spelled);
         let unresolved = without_dots(&absolute(&path));
@@ -156,7 +156,7 @@ impl Root {
     ///
     /// # Errors
     /// If the file is a link out of the folders.
-    pub(crate) fn own_file(&self, name: impl AsRef<Path>) -> Result<Option<PathBuf>> {
+    pub fn own_file(&self, name: impl AsRef<Path>) -> Result<Option<PathBuf>> {
         let path = self.folder.join(name);
         match self.locate(&path) {
             Location::Inside => Ok(Some(path)),
@@ -170,7 +170,7 @@ impl Root {
     ///
     /// # Errors
     /// If the folder cannot be read.
-    pub(crate) fn entries(&self, folder: &Path, links_out: &mut Vec<PathBuf>) -> Result<Vec<PathBuf>> {
+    pub fn entries(&self, folder: &Path, links_out: &mut Vec<PathBuf>) -> Result<Vec<PathBuf>> {
         let mut inside = Vec::new();
         for path in files::entries(folder)? {
             match self.locate(&path) {
@@ -186,7 +186,7 @@ impl Root {
     ///
     /// # Errors
     /// If one does, or if a folder cannot be read.
-    pub(crate) fn refuse_links_out(&self) -> Result<()> {
+    pub fn refuse_links_out(&self) -> Result<()> {
         let mut waiting = vec![self.folder.clone()];
         while let Some(folder) = waiting.pop() {
             let error = |e| Error::file(&folder, "read", e);
@@ -204,7 +204,7 @@ impl Root {
     }
 
     /// Location of a path, following links.
-    pub(crate) fn locate(&self, path: &Path) -> Location {
+    pub fn locate(&self, path: &Path) -> Location {
         match path.canonicalize() {
             Ok(canonical) if self.contains(&canonical) => Location::Inside,
             Ok(_) => Location::Outside,
@@ -218,7 +218,7 @@ impl Root {
     }
 
     /// Warns of links that lead outside the folders; the warning names the first.
-    pub(crate) fn warn_of_links_out(&self, links: &[PathBuf]) {
+    pub fn warn_of_links_out(&self, links: &[PathBuf]) {
         let Some(first) = links.first() else {
             return;
         };
@@ -235,7 +235,7 @@ impl Root {
     }
 
     /// Error for a link out of the folders.
-    pub(crate) fn link_out_error(&self, link: &Path) -> Error {
+    pub fn link_out_error(&self, link: &Path) -> Error {
         let problem =
             format_args!("leads out of {}, the folder of the data; {}", self.folder.display(), allowing_flag(link));
         Error::data(link.display(), problem)

@@ -16,14 +16,14 @@ use super::pairs::{self, Pairs};
 use super::ready_made::{self, SetArgs};
 use super::root::Root;
 use super::source::{DataSource, refuse_questions};
-use crate::error::{Error, Result};
-use crate::files;
-use crate::types::{Choices, Decides, Digest, Evidence, Family, FrameId, Question, QuestionId, SetLight};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::{Choices, Decides, Digest, Evidence, Family, FrameId, Question, QuestionId, SetLight};
 
 /// Flags for sets of photographs.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Data")]
-pub(crate) struct SceneArgs {
+pub struct SceneArgs {
     /// Light in which the photographs were taken; dark photographs are evaluated at L0 only, raw and enhanced, unless
     /// --levels or --llie-on are given; default: from dataset.json, else lit
     #[arg(long, value_enum, value_name = "LIGHT", add = Decides::Trials)]
@@ -45,7 +45,7 @@ pub(crate) struct SceneArgs {
 
 /// Value of `--pairs`: two folders, or one that has both.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum PairFolders {
+pub enum PairFolders {
     /// Folders of the photographs in normal and in low light.
     Two(PathBuf, PathBuf),
     /// A folder with photographs in normal and in low light.
@@ -89,7 +89,7 @@ impl PairFolders {
 
 impl SceneArgs {
     /// Place of the data: the folder of the pairs if `--pairs` is given, else `data`.
-    pub(crate) fn place(&self, data: DataSource) -> DataSource {
+    pub fn place(&self, data: DataSource) -> DataSource {
         match &self.pairs {
             Some(pairs) => DataSource::Path(pairs.folder().to_owned()),
             None => data,
@@ -100,7 +100,7 @@ impl SceneArgs {
     ///
     /// # Errors
     /// If `dataset.json` cannot be read.
-    pub(crate) fn set_light(&self, place: &DataSource, further: &[PathBuf]) -> Result<SetLight> {
+    pub fn set_light(&self, place: &DataSource, further: &[PathBuf]) -> Result<SetLight> {
         match (self.light, place) {
             (Some(light), _) => Ok(light),
             (None, DataSource::Path(path)) if path.is_dir() => frames::light(path, further),
@@ -113,7 +113,7 @@ impl SceneArgs {
     ///
     /// # Errors
     /// If the data cannot be read; the error names the file.
-    pub(crate) fn open(&self, place: &DataSource, questions: Option<&Path>, set: &SetArgs) -> Result<Dataset> {
+    pub fn open(&self, place: &DataSource, questions: Option<&Path>, set: &SetArgs) -> Result<Dataset> {
         match self.pairs_or_classes(place, &set.root.data_root)? {
             None => place.open(questions, set),
             Some(dataset) if self.pairs.is_some() => {
@@ -136,7 +136,7 @@ impl SceneArgs {
     ///
     /// # Errors
     /// If the data cannot be read; the error names the file.
-    pub(crate) fn pairs_or_classes(&self, place: &DataSource, further: &[PathBuf]) -> Result<Option<Dataset>> {
+    pub fn pairs_or_classes(&self, place: &DataSource, further: &[PathBuf]) -> Result<Option<Dataset>> {
         if let Some(pairs) = &self.pairs {
             return pairs::open(pairs.folder(), pairs.open(further)?).map(Some);
         }

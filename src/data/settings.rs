@@ -10,14 +10,14 @@ use clap::Args;
 use super::bank::BankSource;
 use super::ready_made::{is_known_set, known_sets};
 use super::{DataSource, RootArgs, SetArgs};
-use crate::pictures::decode_rule::{ColourRule, DecodeRule, MAX_PIXELS, Transfer};
-use crate::rooms::Rooms;
-use crate::types::{Decides, Family, shell_word};
+use darkqa_base::types::{Decides, Family, shell_word};
+use darkqa_pictures::decode_rule::{ColourRule, DecodeRule, MAX_PIXELS, Transfer};
+use darkqa_rooms::Rooms;
 
 /// Flags for the place of the data and the reading of ready-made sets.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Data")]
-pub(crate) struct DataArgs {
+pub struct DataArgs {
     /// A folder of frames, a ready-made set (.parquet, .tsv, .csv, .json, .jsonl, a folder of them; a well-known one by
     /// its name, as mmbench:FILE), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT,light=linear; repeatable
     /// for the files of one set
@@ -30,7 +30,7 @@ pub(crate) struct DataArgs {
 
 impl DataArgs {
     /// Place of the data, from all `--data` flags together.
-    pub(crate) fn place(&self) -> DataSource {
+    pub fn place(&self) -> DataSource {
         match &*self.data {
             [] => DataSource::default(),
             [place] => place.clone(),
@@ -50,7 +50,7 @@ impl DataArgs {
 /// Flags that select questions.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Data")]
-pub(crate) struct SelectionArgs {
+pub struct SelectionArgs {
     /// Questions file for a folder of frames; default: its questions.jsonl, else made by rule from its maps
     #[arg(long, value_name = "FILE", add = Decides::Reply)]
     pub questions: Option<PathBuf>,
@@ -69,7 +69,7 @@ pub(crate) struct SelectionArgs {
 /// Flags that ask the same questions about every image.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Data")]
-pub(crate) struct BankArgs {
+pub struct BankArgs {
     /// Ask questions without known answers about every image of --data; the report gives each model's agreement with
     /// its own answer in the light; home or home:uncertain (built in), or a JSONL file of id, question, choices;
     /// default: none
@@ -83,7 +83,7 @@ pub(crate) struct BankArgs {
 /// Flag for the maximum size of an image.
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Data")]
-pub(crate) struct PixelLimit {
+pub struct PixelLimit {
     /// The maximum number of pixels of an image; a larger one is refused before it is decoded
     #[arg(long, value_name = "N", default_value_t = NonZeroU64::new(MAX_PIXELS).unwrap_or(NonZeroU64::MIN), add = Decides::Nothing)]
     pub max_pixels: NonZeroU64,
@@ -92,7 +92,7 @@ pub(crate) struct PixelLimit {
 /// Flags for the decoding of images.
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Data")]
-pub(crate) struct DecodeArgs {
+pub struct DecodeArgs {
     /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
@@ -111,7 +111,7 @@ pub(crate) struct DecodeArgs {
 
 /// Flags for reading folders of images.
 #[derive(Debug, Clone, Args)]
-pub(crate) struct FolderArgs {
+pub struct FolderArgs {
     /// The decoding of images.
     #[command(flatten)]
     pub decode: DecodeArgs,
@@ -130,7 +130,7 @@ fn parse_exposure(text: &str) -> Result<f32, String> {
 
 impl DecodeArgs {
     /// Rule by which images are decoded.
-    pub(crate) fn rule(self) -> DecodeRule {
+    pub fn rule(self) -> DecodeRule {
         DecodeRule {
             max_pixels: self.limit.max_pixels.get(),
             colour: self.colour,
@@ -142,7 +142,7 @@ impl DecodeArgs {
 
 /// Parses the value of `--data`: a path, `rooms`, `rooms:frames=48,seed=7,size=1280x720`, or a well-known set with its
 /// path, such as `mmvp:FILE`. An existing file or folder with the same name takes precedence, except for `rooms:…`.
-pub(crate) fn parse_data_source(text: &str) -> Result<DataSource, String> {
+pub fn parse_data_source(text: &str) -> Result<DataSource, String> {
     let path = PathBuf::from(text);
     match text.strip_prefix("rooms:") {
         Some(rooms) => rooms.parse().map(DataSource::Rooms),

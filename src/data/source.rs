@@ -7,11 +7,11 @@ use super::dataset::{Dataset, stem};
 use super::frames;
 use super::ready_made::{self, SetArgs};
 use super::root::Root;
-use crate::error::{Error, Result};
-use crate::files::at_most;
-use crate::rooms::{self, Rooms};
-use crate::types::text::excerpt;
-use crate::types::{Labels, shell_word};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::at_most;
+use darkqa_base::types::text::excerpt;
+use darkqa_base::types::{Labels, shell_word};
+use darkqa_rooms::Rooms;
 
 /// Where the data are, as given by `--data`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -104,7 +104,7 @@ impl DataSource {
     /// If `classes.json` cannot be read; the error names the file.
     pub fn labels(&self, further: &[PathBuf]) -> Result<Option<Labels>> {
         match self {
-            Self::Rooms(_) => Ok(Some(rooms::labels())),
+            Self::Rooms(_) => Ok(Some(darkqa_rooms::labels())),
             Self::Path(path) if path.is_dir() => frames::labels(path, further),
             Self::Path(_) | Self::Files(_) | Self::Known { .. } => Ok(None),
         }

@@ -4,11 +4,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::ask::{AskError, Reach};
-use crate::engine::models::ModelUnderTest;
-use crate::error::Error;
-use crate::types::manifests::{Counts, Status};
-use crate::types::{Failure, FailureKind};
+use crate::models::ModelUnderTest;
+use darkqa_ask::{AskError, Reach};
+use darkqa_base::error::Error;
+use darkqa_base::types::manifests::{Counts, Status};
+use darkqa_base::types::{Failure, FailureKind};
 
 /// Number of failed trials after which a model without any success is stopped, because further trials would fail, too.
 const FAILURES_AT_START: usize = 5;
@@ -27,7 +27,7 @@ const MIN_REFUSED_SOURCES: usize = 3;
 
 /// Reason why no more trials are asked.
 #[derive(Debug)]
-pub(crate) enum EndReason {
+pub enum EndReason {
     /// All trials of the plan were asked.
     AllAsked,
     /// The user or the batch system interrupted it.
@@ -42,7 +42,7 @@ pub(crate) enum EndReason {
 
 impl EndReason {
     /// Status of a run that ended for this reason with these numbers of trials.
-    pub(crate) fn status(&self, counts: Counts) -> Status {
+    pub fn status(&self, counts: Counts) -> Status {
         match self {
             // Truncated replies that are asked again count as answered.
             Self::OverBudget => Status::OverBudget,
@@ -110,7 +110,7 @@ struct ModelState {
 
 /// Counts failed trials, and stops one model or the run when too many have failed.
 #[derive(Debug)]
-pub(crate) struct CircuitBreaker {
+pub struct CircuitBreaker {
     max_failures: Option<usize>,
     /// True if the run ends when the first model is stopped.
     fails_fast: bool,
@@ -127,7 +127,7 @@ pub(crate) struct CircuitBreaker {
 
 impl CircuitBreaker {
     /// A circuit breaker for these models. Up to `concurrency` requests in flight may fail for the same cause.
-    pub(crate) fn new(models: &[ModelUnderTest], concurrency: usize, max_failures: Option<usize>) -> Self {
+    pub fn new(models: &[ModelUnderTest], concurrency: usize, max_failures: Option<usize>) -> Self {
         Self {
             max_failures,
             fails_fast: false,
@@ -148,27 +148,28 @@ impl CircuitBreaker {
     }
 
     /// Sets whether the run ends when the first model is stopped.
-    pub(crate) fn with_fail_fast(self, fails_fast: bool) -> Self {
+    #[must_use]
+    pub fn with_fail_fast(self, fails_fast: bool) -> Self {
         Self { fails_fast, ..self }
     }
 
     /// True if no more trials of any model are asked.
-    pub(crate) fn stopped(&self) -> bool {
+    pub fn stopped(&self) -> bool {
         self.stopped
     }
 
     /// True if no more trials of a model are asked.
-    pub(crate) fn is_stopped(&self, model: usize) -> bool {
+    pub fn is_stopped(&self, model: usize) -> bool {
         self.models[model].health.stopped
     }
 
     /// Number of failed trials.
-    pub(crate) fn failures(&self) -> usize {
+    pub fn failures(&self) -> usize {
         self.failures
     }
 
     /// The reason why the run ended; [`EndReason::AllAsked`] if nothing stopped it.
-    pub(crate) fn into_end(self) -> EndReason {
+    pub fn into_end(self) -> EndReason {
         match self.end {
             Some(EndReason::Stopped(_)) if !self.stopped => EndReason::ModelsStopped(self.model_errors),
             end => end.unwrap_or(EndReason::AllAsked),
@@ -176,17 +177,17 @@ impl CircuitBreaker {
     }
 
     /// Stops the run because of an interrupt.
-    pub(crate) fn interrupted(&mut self) {
+    pub fn interrupted(&mut self) {
         self.stop(EndReason::Interrupted);
     }
 
     /// Stops the run because of this machine: an enhancer cannot be used any further, or a file cannot be written.
-    pub(crate) fn ended(&mut self, error: Error) {
+    pub fn ended(&mut self, error: Error) {
         self.stop(EndReason::Stopped(error));
     }
 
     /// Stops the run because one more question could exceed `--max-cost`.
-    pub(crate) fn over_budget(&mut self) {
+    pub fn over_budget(&mut self) {
         self.stop(EndReason::OverBudget);
     }
 
@@ -199,7 +200,7 @@ impl CircuitBreaker {
     }
 
     /// Records a reply of a model.
-    pub(crate) fn succeeded(&mut self, model: usize) {
+    pub fn succeeded(&mut self, model: usize) {
         let health = &mut self.models[model].health;
         (health.succeeded, health.outage) = (true, 0);
         health.outage_sources.clear();
@@ -209,7 +210,7 @@ impl CircuitBreaker {
 
     /// Records a failed trial about a frame or walk. `may_be_cause` is the result of
     /// [`Suspects::may_be_cause`](Suspects).
-    pub(crate) fn failed(&mut self, model: usize, error: &AskError, source: &str, may_be_cause: bool) {
+    pub fn failed(&mut self, model: usize, error: &AskError, source: &str, may_be_cause: bool) {
         if error.reach == Reach::Interrupted {
             return;
         }
@@ -222,7 +223,7 @@ impl CircuitBreaker {
 
     /// Records a refused trial about a frame or walk that waits until the model answers another one. If it fails in the
     /// end, [`failed`](Self::failed) counts it.
-    pub(crate) fn refused(&mut self, model: usize, error: &AskError, source: &str) {
+    pub fn refused(&mut self, model: usize, error: &AskError, source: &str) {
         self.models[model].health.count_refusal(error, source);
         self.check(model, error, source, false);
     }
@@ -292,7 +293,7 @@ const GIVEN_UP_AFTER: usize = 3;
 
 /// Counts of failures by model and by frame or walk, to find images that make a server fail.
 #[derive(Debug, Default)]
-pub(crate) struct Suspects {
+pub struct Suspects {
     /// Number of failures of the server or the network, by model and source.
     failures: BTreeMap<(usize, String), usize>,
     /// Models with the sources that they have answered a trial about. Such a source is not suspected: the server had an
@@ -304,7 +305,7 @@ pub(crate) struct Suspects {
 
 impl Suspects {
     /// Records a reply.
-    pub(crate) fn succeeded(&mut self, model: usize, source: &str) {
+    pub fn succeeded(&mut self, model: usize, source: &str) {
         let key = (model, source.to_owned());
         self.failures.remove(&key);
         self.answered.insert(key);
@@ -312,7 +313,7 @@ impl Suspects {
 
     /// Records a failure, unless its cause cannot be the image. Returns true if the other trials about the image are
     /// set aside from now on.
-    pub(crate) fn failed(&mut self, model: usize, error: &AskError, source: &str) -> bool {
+    pub fn failed(&mut self, model: usize, error: &AskError, source: &str) -> bool {
         use FailureKind::{Connection, Response, Server, Timeout};
         let may_be_image = matches!(error.failure.kind, Connection | Response | Server | Timeout);
         let key = (model, source.to_owned());
@@ -326,28 +327,28 @@ impl Suspects {
 
     /// True if the image alone may be the cause of a failure: the model has not answered about it, and trials about
     /// others are left.
-    pub(crate) fn may_be_cause(&self, model: usize, source: &str) -> bool {
+    pub fn may_be_cause(&self, model: usize, source: &str) -> bool {
         !self.asks_deferred && !self.answered.contains(&(model, source.to_owned()))
     }
 
     /// True if the trials about a source wait until all others have been asked.
-    pub(crate) fn is_deferred(&self, model: usize, source: &str) -> bool {
+    pub fn is_deferred(&self, model: usize, source: &str) -> bool {
         !self.asks_deferred && self.count(model, source) >= ASIDE_AFTER
     }
 
     /// True if no more trials about a source are asked in this call, because the server fails for it and answers
     /// others.
-    pub(crate) fn is_given_up(&self, model: usize, source: &str) -> bool {
+    pub fn is_given_up(&self, model: usize, source: &str) -> bool {
         self.asks_deferred && self.has_answered(model) && self.count(model, source) >= GIVEN_UP_AFTER
     }
 
     /// Begins the trials that were set aside; no others are left.
-    pub(crate) fn start_deferred(&mut self) {
+    pub fn start_deferred(&mut self) {
         self.asks_deferred = true;
     }
 
     /// True if a model has answered any trial.
-    pub(crate) fn has_answered(&self, model: usize) -> bool {
+    pub fn has_answered(&self, model: usize) -> bool {
         self.answered.range((model, String::new())..).next().is_some_and(|(answered, _)| *answered == model)
     }
 
@@ -360,8 +361,8 @@ impl Suspects {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ask::{Model, Random};
-    use crate::types::View;
+    use darkqa_ask::{Model, Random};
+    use darkqa_base::types::View;
 
     fn breaker(models: usize, max_failures: Option<usize>) -> CircuitBreaker {
         let model = |_| ModelUnderTest::new(Model::Random(Random { seed: 0 }), View::Image, None).unwrap();

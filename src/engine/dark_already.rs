@@ -2,12 +2,12 @@
 
 use rayon::prelude::*;
 
-use crate::data::Picture;
-use crate::engine::experiment::Experiment;
-use crate::engine::images::frames::{Frames, Source, SourceFrame};
-use crate::engine::images::progress::Progress;
-use crate::engine::settings::JobSettings;
-use crate::types::{AxisLevel, SetLight};
+use crate::experiment::Experiment;
+use crate::images::frames::{Frames, Source, SourceFrame};
+use crate::images::progress::Progress;
+use crate::settings::JobSettings;
+use darkqa_base::types::{AxisLevel, SetLight};
+use darkqa_data::Picture;
 use darkqa_enhance::{EnhancerArgs, brightness as brightness_in_codes};
 use darkqa_light::{LightSettings, mean_luminance};
 
@@ -18,7 +18,7 @@ const MAX_SAMPLED: usize = 24;
 const DARK: f64 = 40.0;
 
 /// Advice on dark images; `None` if they are not dark. `median` is the median of their mean luma, from 0 to 255.
-pub(crate) fn advice(median: f64) -> Option<String> {
+pub fn advice(median: f64) -> Option<String> {
     (median < DARK).then(|| {
         format!(
             "these images are dark already (median brightness {median:.0} of 255); --levels L0 --llie-on l0 asks about them as they are \
@@ -28,7 +28,7 @@ pub(crate) fn advice(median: f64) -> Option<String> {
 }
 
 /// Prints a note if photographs taken in the dark are asked about unchanged, or a warning if they are darkened further.
-pub(crate) fn print_note(job: &JobSettings, progress: &Progress) {
+pub fn print_note(job: &JobSettings, progress: &Progress) {
     if job.set_light == SetLight::Lit {
         return;
     }
@@ -46,7 +46,7 @@ pub(crate) fn print_note(job: &JobSettings, progress: &Progress) {
 
 /// Mean linear luminance of up to [`MAX_SAMPLED`] evenly spaced frames, and their number; `None` if none can be
 /// decoded.
-pub(crate) fn brightness(frames: &dyn Frames, sources: &[Source]) -> Option<(f64, usize)> {
+pub fn brightness(frames: &dyn Frames, sources: &[Source]) -> Option<(f64, usize)> {
     let sample = sample_frames(frames, sources, |picture| Some(mean_luminance(&picture.decode().ok()?)));
     let mean = sample.iter().sum::<f64>() / sample.len() as f64;
     (!sample.is_empty()).then_some((mean, sample.len()))
@@ -54,7 +54,7 @@ pub(crate) fn brightness(frames: &dyn Frames, sources: &[Source]) -> Option<(f64
 
 /// Tells whether dark images in a data set are expected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum DarkImages {
+pub enum DarkImages {
     /// The data set is declared as dark, or only L0 is asked, with and without enhancement.
     Expected,
     /// The user may assume that the images are well lit.
@@ -63,7 +63,7 @@ pub(crate) enum DarkImages {
 
 impl DarkImages {
     /// Decides from the declared light of a data set and from the levels and enhancers of the job.
-    pub(crate) fn new(set: SetLight, light: &LightSettings, enhancers: &EnhancerArgs) -> Self {
+    pub fn new(set: SetLight, light: &LightSettings, enhancers: &EnhancerArgs) -> Self {
         let asks_raw_and_enhanced_l0 =
             light.levels == [AxisLevel::L0] && !enhancers.is_empty() && enhancers.on().includes_kind(None);
         if set == SetLight::Dark || asks_raw_and_enhanced_l0 { Self::Expected } else { Self::Unexpected }
@@ -71,7 +71,7 @@ impl DarkImages {
 }
 
 /// Warns if the frames of an experiment are dark, unless that is expected ([`DarkImages`]).
-pub(crate) fn warn<E: Experiment>(experiment: &E) {
+pub fn warn<E: Experiment>(experiment: &E) {
     let settings = experiment.settings();
     let dark = DarkImages::new(settings.set_light, &settings.light, &settings.enhancers);
     if dark == DarkImages::Expected {

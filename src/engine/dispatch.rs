@@ -16,56 +16,56 @@ use super::circuit_breaker::Suspects;
 use super::lanes::{Finished, send};
 use super::models::ServedNames;
 use super::refusals::FirstFailures;
-use crate::ask::{AskError, Reach, sleep_running};
-use crate::engine::circuit_breaker::{CircuitBreaker, EndReason};
-use crate::engine::costs::{Budget, BudgetNotes, InFlightCost, Permit, TokenCheck};
-use crate::engine::images::image_pipeline::EnhancerStopper;
-use crate::engine::images::notes::ImageNotes;
-use crate::engine::images::progress::{LINE_INTERVAL, Progress, TrialProgress};
-use crate::engine::images::timings::{TimedStep, Timings};
-use crate::engine::images::trials::{Item, PreparedGroup, Trial};
-use crate::engine::images::workers::thread_start_error;
-use crate::engine::interrupt::Interrupt;
-use crate::engine::lanes::{Lanes, PreparedTrial};
-use crate::engine::models::ModelUnderTest;
-use crate::engine::refusals::Refusals;
-use crate::engine::reply_checks::ReplyChecks;
-use crate::engine::settings::JobSettings;
-use crate::error::{Error, Result};
-use crate::store::Store;
-use crate::types::{Digest, FailureKind, Finish, Record, Reply, SetLight, TrialKey};
+use crate::circuit_breaker::{CircuitBreaker, EndReason};
+use crate::costs::{Budget, BudgetNotes, InFlightCost, Permit, TokenCheck};
+use crate::images::image_pipeline::EnhancerStopper;
+use crate::images::notes::ImageNotes;
+use crate::images::progress::{LINE_INTERVAL, Progress, TrialProgress};
+use crate::images::timings::{TimedStep, Timings};
+use crate::images::trials::{Item, PreparedGroup, Trial};
+use crate::images::workers::thread_start_error;
+use crate::interrupt::Interrupt;
+use crate::lanes::{Lanes, PreparedTrial};
+use crate::models::ModelUnderTest;
+use crate::refusals::Refusals;
+use crate::reply_checks::ReplyChecks;
+use crate::settings::JobSettings;
+use darkqa_ask::{AskError, Reach, sleep_running};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::{Digest, FailureKind, Finish, Record, Reply, SetLight, TrialKey};
 use darkqa_score::answers::record::answered;
 use darkqa_score::answers::{ImageDependence, LitReply};
+use darkqa_store::Store;
 
 /// Maximum number of prepared groups that wait in the channel.
 const GROUPS_AHEAD: usize = 2;
 
 /// Models and settings of one phase of a run.
-pub(crate) struct Dispatcher<'a> {
-    pub(crate) models: &'a [ModelUnderTest],
-    pub(crate) progress: &'a Progress,
-    pub(crate) settings: &'a JobSettings,
-    pub(crate) timings: &'a Timings,
+pub struct Dispatcher<'a> {
+    pub models: &'a [ModelUnderTest],
+    pub progress: &'a Progress,
+    pub settings: &'a JobSettings,
+    pub timings: &'a Timings,
     /// Trials that a gateway gave up on in an earlier call.
-    pub(crate) timed_out: HashSet<TrialKey>,
-    pub(crate) in_flight_cost: InFlightCost,
+    pub timed_out: HashSet<TrialKey>,
+    pub in_flight_cost: InFlightCost,
     /// The checks of the replies, which begin anew.
-    pub(crate) replies: ReplyChecks,
+    pub replies: ReplyChecks,
 }
 
 /// Numbers of trials in one phase.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct TrialCounts {
+pub struct TrialCounts {
     /// Number of trials, answered or not.
-    pub(crate) trials: usize,
+    pub trials: usize,
     /// Number of trials with a reply.
-    pub(crate) answered: usize,
+    pub answered: usize,
 }
 
 impl Dispatcher<'_> {
     /// Asks the trials of the groups that `make` sends. `make` runs on a separate thread until the channel is closed.
     /// `stoppers` cancel enhancements in progress.
-    pub(crate) fn run<I: Item>(
+    pub fn run<I: Item>(
         &self,
         counts: TrialCounts,
         budget: Budget,

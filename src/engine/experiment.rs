@@ -2,40 +2,40 @@
 
 use serde_json::Value;
 
-use crate::engine::images::frames::{Frames, Source};
-use crate::engine::images::recipes::Recipe;
-use crate::engine::images::trials::{Item, Plan, SourcePlan};
-use crate::engine::models::ModelUnderTest;
-use crate::engine::settings::JobSettings;
-use crate::error::Result;
-use crate::runs::forecast::PowerForecast;
-use crate::runs::outcome::{Outcome, StdoutFormat};
-use crate::runs::stored::StoredRun;
-use crate::store::Store;
-use crate::types::manifests::{Columns, Identity, PartPlace, RunManifest};
-use crate::types::{Record, RunQuestion, TrialKey};
+use crate::images::frames::{Frames, Source};
+use crate::images::recipes::Recipe;
+use crate::images::trials::{Item, Plan, SourcePlan};
+use crate::models::ModelUnderTest;
+use crate::settings::JobSettings;
+use darkqa_base::error::Result;
+use darkqa_base::types::manifests::{Columns, Identity, PartPlace, RunManifest};
+use darkqa_base::types::{Record, RunQuestion, TrialKey};
+use darkqa_runs::forecast::PowerForecast;
+use darkqa_runs::outcome::{Outcome, StdoutFormat};
+use darkqa_runs::stored::StoredRun;
 use darkqa_score::choice::llm_match::Protocol;
+use darkqa_store::Store;
 
 /// Record type of an experiment's trials.
-pub(crate) type RecordOf<E> = Record<DetailOf<E>>;
+pub type RecordOf<E> = Record<DetailOf<E>>;
 
 /// The fields that an experiment adds to a record.
-pub(crate) type DetailOf<E> = <<E as Experiment>::Item as Item>::Detail;
+pub type DetailOf<E> = <<E as Experiment>::Item as Item>::Detail;
 
 /// A request of a later phase that cannot be planned before the replies of an earlier one.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct ExpectedRequest {
+pub struct ExpectedRequest {
     /// Index of the model in [`Experiment::models`] of its phase.
-    pub(crate) model: usize,
+    pub model: usize,
     /// Expected number of text tokens in the prompt.
-    pub(crate) text_tokens: f64,
+    pub text_tokens: f64,
     /// Expected number of tokens in the reply.
-    pub(crate) reply_tokens: f64,
+    pub reply_tokens: f64,
 }
 
 /// An evaluation that is ready to run: multiple-choice questions, or open questions whose answers a judge marks. Its
 /// inputs are opened and checked, but no request was sent and nothing was written yet.
-pub(crate) trait Experiment: Sync {
+pub trait Experiment: Sync {
     /// The question, or the answer to judge, of one trial.
     type Item: Item;
 

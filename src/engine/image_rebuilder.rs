@@ -5,29 +5,29 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use crate::data::{DataArgs, DataSource, Dataset, Photographs, open_frames, parse_data_source};
-use crate::engine::images::enhancement::enhancers;
-use crate::engine::images::enhancement::enhancers::{EnhancerModels, EnhancerRunArgs};
-use crate::engine::images::frames::{Frames, Source, WalkArgs, WalkFolder, photographs};
-use crate::engine::images::image_pipeline::ImagePipeline;
-use crate::engine::images::recipes::Recipe;
-use crate::engine::images::recipes::image_recipe::ImageFlags;
-use crate::engine::images::timings::{ImageSteps, Timings};
-use crate::engine::images::trials::ASK;
-use crate::engine::images::workers::ThreadArgs;
-use crate::error::{Error, Result};
-use crate::pictures::Payload;
-use crate::types::manifests::{PngForm, RunManifest};
-use crate::types::{Condition, Decides, FrameId};
+use crate::images::enhancement::enhancers;
+use crate::images::enhancement::enhancers::{EnhancerModels, EnhancerRunArgs};
+use crate::images::frames::{Frames, Source, WalkArgs, WalkFolder, photographs};
+use crate::images::image_pipeline::ImagePipeline;
+use crate::images::recipes::Recipe;
+use crate::images::recipes::image_recipe::ImageFlags;
+use crate::images::timings::{ImageSteps, Timings};
+use crate::images::trials::ASK;
+use crate::images::workers::ThreadArgs;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::{PngForm, RunManifest};
+use darkqa_base::types::{Condition, Decides, FrameId};
+use darkqa_data::{DataArgs, DataSource, Dataset, Photographs, open_frames, parse_data_source};
 use darkqa_enhance::{EnhancedFolder, Enhancer, Implausible, ProbeArgs, RuntimeArgs};
 use darkqa_light::KindSettings;
+use darkqa_pictures::Payload;
 
 /// Flags for the current paths of a run's data and enhancers, and for running them.
 ///
 /// Their environment variables are `DARKQA_MOVED_DATA`, `DARKQA_MOVED_LLIE` and `DARKQA_MOVED_ENHANCED`, because
 /// `DARKQA_DATA` applies to new runs only.
 #[derive(Debug, Clone, Args)]
-pub(crate) struct RebuildArgs {
+pub struct RebuildArgs {
     /// The data, if they were moved; default: where they were
     #[arg(id = "moved_data", long = "data", value_name = "DIR|FILE|rooms:…", add = Decides::Nothing)]
     pub data: Option<PathBuf>,
@@ -46,7 +46,7 @@ pub(crate) struct RebuildArgs {
 }
 
 /// Rebuilds the images of a run with the settings in its manifest.
-pub(crate) struct ImageRebuilder {
+pub struct ImageRebuilder {
     data: FrameData,
     recipe: Recipe,
     png: PngForm,
@@ -65,12 +65,7 @@ impl ImageRebuilder {
     ///
     /// # Errors
     /// If the manifest has no image flags, or the data or an enhancer cannot be opened.
-    pub(crate) fn open(
-        args: RebuildArgs,
-        manifest: &RunManifest,
-        folder: &Path,
-        conditions: &[Condition],
-    ) -> Result<Self> {
+    pub fn open(args: RebuildArgs, manifest: &RunManifest, folder: &Path, conditions: &[Condition]) -> Result<Self> {
         let wrong = |problem: String| {
             let path = folder.to_owned();
             Error::Run { path, problem }
@@ -119,7 +114,7 @@ impl ImageRebuilder {
     ///
     /// # Errors
     /// If the frame is missing, or an image cannot be made.
-    pub(crate) fn images(&mut self, name: &FrameId, conditions: &[Condition]) -> Result<Vec<Vec<Arc<Payload>>>> {
+    pub fn images(&mut self, name: &FrameId, conditions: &[Condition]) -> Result<Vec<Vec<Arc<Payload>>>> {
         let mut source = self.source(name).map_err(|e| {
             let problem = format_args!("{e}; if the data were moved, name their folder with --data");
             Error::data(name, problem)

@@ -4,10 +4,10 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::error::{Error, Result};
+use darkqa_base::error::{Error, Result};
 
 /// Exit code after an interrupt: that of a shell after Ctrl-C.
-pub(crate) const INTERRUPTED: u8 = 130;
+pub const INTERRUPTED: u8 = 130;
 
 /// Number of listeners. Without one, interrupts end the process.
 static LISTENERS: AtomicUsize = AtomicUsize::new(0);
@@ -20,7 +20,7 @@ static LISTENERS: AtomicUsize = AtomicUsize::new(0);
 /// they are written under another name.
 #[cfg(unix)]
 #[expect(unsafe_code, reason = "a signal handler")]
-pub(crate) fn end_at_interrupts() {
+pub fn end_at_interrupts() {
     let handler: extern "C" fn(libc::c_int) = end;
     for signal in [libc::SIGINT, libc::SIGTERM, libc::SIGHUP] {
         // SAFETY: an all-zero `sigaction` is valid, both calls read or write only that structure, and the handler calls
@@ -39,7 +39,7 @@ pub(crate) fn end_at_interrupts() {
 
 /// Windows ends a process at Ctrl-C by itself.
 #[cfg(not(unix))]
-pub(crate) fn end_at_interrupts() {}
+pub fn end_at_interrupts() {}
 
 /// Ends the process if there is no listener.
 ///
@@ -83,7 +83,7 @@ impl Drop for Listening {
 /// A listener for interrupts. While it exists, interrupts do not end the process. An interrupt between two calls of
 /// [`Self::next`] is kept for the second.
 #[derive(Debug)]
-pub(crate) struct Interrupt {
+pub struct Interrupt {
     #[cfg(unix)]
     ctrl_c: tokio::signal::unix::Signal,
     #[cfg(unix)]
@@ -101,7 +101,7 @@ impl Interrupt {
     ///
     /// # Errors
     /// If the system does not allow it.
-    pub(crate) fn listen() -> Result<Self> {
+    pub fn listen() -> Result<Self> {
         #[cfg(unix)]
         {
             use tokio::signal::unix::{SignalKind, signal};
@@ -122,7 +122,7 @@ impl Interrupt {
     }
 
     /// Waits for the next interrupt.
-    pub(crate) async fn next(&mut self) {
+    pub async fn next(&mut self) {
         #[cfg(unix)]
         tokio::select! {
             _ = self.ctrl_c.recv() => {}

@@ -10,30 +10,30 @@ use serde_json::json;
 
 use super::models::{AskSettings, ModelName};
 use super::settings::{JobSettings, RESULTS, RunPlace};
-use crate::engine::batch::{self, BatchFileArgs, BatchRunArgs};
-use crate::engine::costs::{MeasuredTokens, estimate};
-use crate::engine::experiment::{DetailOf, Experiment};
-use crate::engine::images::enhancement::enhancers::EnhancerModels;
-use crate::engine::images::frames::{input_summary, warn_of_inputs};
-use crate::engine::images::progress::Progress;
-use crate::engine::images::recipes::Maker;
-use crate::engine::images::stored::StoredFindings;
-use crate::engine::images::timings::Timings;
-use crate::engine::images::trials::Plan;
-use crate::engine::open_run::{OpenRun, pipeline};
-use crate::engine::stored_keys::{answered, lost_for_good, truncated};
-use crate::engine::{dark_already, manifest};
-use crate::error::{Error, Result};
-use crate::report::forecast::{forecast_json, render};
-use crate::runs::forecast::Forecast;
-use crate::runs::outcome::Outcome;
-use crate::store::{self, AddressChange, Store};
-use crate::types::manifests::{RunManifest, Status};
-use crate::types::{Digest, StoredDetail as _, TrialKey};
+use crate::batch::{self, BatchFileArgs, BatchRunArgs};
+use crate::costs::{MeasuredTokens, estimate};
+use crate::experiment::{DetailOf, Experiment};
+use crate::images::enhancement::enhancers::EnhancerModels;
+use crate::images::frames::{input_summary, warn_of_inputs};
+use crate::images::progress::Progress;
+use crate::images::recipes::Maker;
+use crate::images::stored::StoredFindings;
+use crate::images::timings::Timings;
+use crate::images::trials::Plan;
+use crate::open_run::{OpenRun, pipeline};
+use crate::stored_keys::{answered, lost_for_good, truncated};
+use crate::{dark_already, manifest};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::{RunManifest, Status};
+use darkqa_base::types::{Digest, StoredDetail as _, TrialKey};
 use darkqa_enhance::ModelFile;
+use darkqa_report::forecast::{forecast_json, render};
+use darkqa_runs::forecast::Forecast;
+use darkqa_runs::outcome::Outcome;
+use darkqa_store::{AddressChange, Store};
 
 /// An experiment and its run folder.
-pub(crate) struct Job<'a, E: Experiment> {
+pub struct Job<'a, E: Experiment> {
     experiment: &'a E,
     /// Files of the enhancement models, not yet loaded.
     files: Vec<ModelFile>,
@@ -44,7 +44,7 @@ pub(crate) struct Job<'a, E: Experiment> {
 
 impl<'a, E: Experiment> Job<'a, E> {
     /// A job in the run folder of the experiment. Nothing is written.
-    pub(crate) fn new(experiment: &'a E, files: Vec<ModelFile>, progress: &'a Progress) -> Result<Self> {
+    pub fn new(experiment: &'a E, files: Vec<ModelFile>, progress: &'a Progress) -> Result<Self> {
         Ok(Self { folder: find(experiment)?, experiment, files, progress })
     }
 
@@ -52,7 +52,7 @@ impl<'a, E: Experiment> Job<'a, E> {
     ///
     /// # Errors
     /// If nothing can be asked, or no further trial could succeed. Replies that had arrived are kept.
-    pub(crate) fn run(self) -> Result<Outcome> {
+    pub fn run(self) -> Result<Outcome> {
         warn_of_inputs(&input_summary(self.experiment.sources()));
         if self.experiment.settings().money.dry_run { self.estimate() } else { self.open()?.ask() }
     }
@@ -61,7 +61,7 @@ impl<'a, E: Experiment> Job<'a, E> {
     ///
     /// # Errors
     /// If a model is built in, an image is larger than the endpoint accepts, or a file cannot be written.
-    pub(crate) fn export_batch(self, files: &BatchFileArgs) -> Result<Outcome> {
+    pub fn export_batch(self, files: &BatchFileArgs) -> Result<Outcome> {
         warn_of_inputs(&input_summary(self.experiment.sources()));
         batch::file::export(self.open()?, files)
     }
@@ -71,7 +71,7 @@ impl<'a, E: Experiment> Job<'a, E> {
     /// # Errors
     /// If a model is built in, or a server refuses a request that every further call would repeat. Submitted batches
     /// are kept, and the same command continues.
-    pub(crate) fn run_batch(self, files: &BatchFileArgs, args: &BatchRunArgs) -> Result<Outcome> {
+    pub fn run_batch(self, files: &BatchFileArgs, args: &BatchRunArgs) -> Result<Outcome> {
         warn_of_inputs(&input_summary(self.experiment.sources()));
         if self.experiment.settings().money.dry_run {
             return self.estimate();
@@ -90,16 +90,16 @@ impl<'a, E: Experiment> Job<'a, E> {
     ///
     /// # Errors
     /// If the run has other settings, an enhancer cannot be opened, or an image cannot be made.
-    pub(crate) fn forecast(self) -> Result<Forecast> {
+    pub fn forecast(self) -> Result<Forecast> {
         let experiment = self.experiment;
         let settings = experiment.settings();
         self.check_same_run()?;
-        let stored = store::read_trials::<DetailOf<E>>(&self.folder)?;
+        let stored = darkqa_store::read_trials::<DetailOf<E>>(&self.folder)?;
         let mut answered = answered(&stored);
         answered.extend(lost_for_good(&stored, settings));
         let (mut plans, mut measured) = (Vec::new(), Vec::new());
         for phase in 0..E::PHASES.len() {
-            let mut plan = Plan::new(experiment.plan(phase, || store::read_records(&self.folder))?);
+            let mut plan = Plan::new(experiment.plan(phase, || darkqa_store::read_records(&self.folder))?);
             let models = experiment.models(phase).len();
             measured.push(MeasuredTokens::from_stored(models, &plan, experiment.sources(), &stored));
             let again = truncated(&stored, experiment.models(phase));
@@ -123,25 +123,25 @@ impl<'a, E: Experiment> Job<'a, E> {
     /// # Errors
     /// If the run has other settings.
     fn check_same_run(&self) -> Result<()> {
-        if store::manifest_damage(&self.folder)?.is_some() {
+        if darkqa_store::manifest_damage(&self.folder)?.is_some() {
             return Ok(());
         }
-        let Some(stored) = store::read_manifest(&self.folder, DetailOf::<E>::SCHEMA)? else {
+        let Some(stored) = darkqa_store::read_manifest(&self.folder, DetailOf::<E>::SCHEMA)? else {
             return Ok(());
         };
         let requested = manifest::run_manifest(self.experiment, Some(stored.clone()))?;
         let address_change = address_change(&self.experiment.settings().place);
-        store::check_same_run(&self.folder, &stored, &requested, address_change)
+        darkqa_store::check_same_run(&self.folder, &stored, &requested, address_change)
     }
 
     /// Opens the run folder.
     fn open(self) -> Result<OpenRun<'a, E>> {
         let Self { experiment, files, folder, progress } = self;
         let settings = experiment.settings();
-        let damage = store::manifest_damage(&folder)?;
+        let damage = darkqa_store::manifest_damage(&folder)?;
         let stored = match damage {
             Some(_) => None,
-            None => store::read_manifest(&folder, DetailOf::<E>::SCHEMA)?,
+            None => darkqa_store::read_manifest(&folder, DetailOf::<E>::SCHEMA)?,
         };
         let complete = stored.as_ref().is_some_and(|stored| stored.status == Status::Complete);
         let images = settings.images.open(settings.access)?;
@@ -195,7 +195,7 @@ impl<'a, E: Experiment> Job<'a, E> {
 fn planned_keys<E: Experiment>(experiment: &E, folder: &Path) -> Result<HashSet<TrialKey>> {
     let mut keys = HashSet::new();
     for phase in 0..E::PHASES.len() {
-        keys.extend(experiment.plan_without(phase, || store::read_records(folder), |_| true)?.keys);
+        keys.extend(experiment.plan_without(phase, || darkqa_store::read_records(folder), |_| true)?.keys);
     }
     Ok(keys)
 }
@@ -208,7 +208,7 @@ fn planned_keys<E: Experiment>(experiment: &E, folder: &Path) -> Result<HashSet<
 /// If a stored reply belongs to a trial that this command does not plan.
 fn restore_manifest<E: Experiment>(experiment: &E, folder: &Path, manifest: &RunManifest, damage: &str) -> Result<()> {
     let planned = planned_keys(experiment, folder)?;
-    let trials = store::read_trials::<DetailOf<E>>(folder)?;
+    let trials = darkqa_store::read_trials::<DetailOf<E>>(folder)?;
     let (own, others) =
         trials.iter().filter(|trial| !trial.failed()).partition::<Vec<_>, _>(|trial| planned.contains(&trial.key));
     if !others.is_empty() {
@@ -221,19 +221,19 @@ fn restore_manifest<E: Experiment>(experiment: &E, folder: &Path, manifest: &Run
         let path = folder.to_owned();
         return Err(Error::Run { path, problem });
     }
-    store::restore_manifest(folder, manifest)?;
+    darkqa_store::restore_manifest(folder, manifest)?;
     tracing::warn!("{damage}; made again: all {} replies of the run are of this command", own.len());
     Ok(())
 }
 
 /// The folder of a run: the one named, else the newest of the same identity and plan, else a new one.
-pub(crate) fn find<E: Experiment>(experiment: &E) -> Result<PathBuf> {
+pub fn find<E: Experiment>(experiment: &E) -> Result<PathBuf> {
     let settings = experiment.settings();
     match settings.place.for_shard(settings.shard) {
         RunPlace::Named(path) => Ok(path),
         // The manifest is restored later, when the folder is opened.
-        RunPlace::Resume(path) if store::manifest_damage(&path)?.is_some() => Ok(path),
-        RunPlace::Resume(path) => match store::read_manifest(&path, DetailOf::<E>::SCHEMA)? {
+        RunPlace::Resume(path) if darkqa_store::manifest_damage(&path)?.is_some() => Ok(path),
+        RunPlace::Resume(path) => match darkqa_store::read_manifest(&path, DetailOf::<E>::SCHEMA)? {
             Some(_) => Ok(path),
             None => Err(Error::usage(
                 "--resume",
@@ -248,7 +248,7 @@ pub(crate) fn find<E: Experiment>(experiment: &E) -> Result<PathBuf> {
 ///
 /// # Errors
 /// If it cannot be created.
-pub(crate) fn make(folder: &Path, settings: &JobSettings) -> Result<()> {
+pub fn make(folder: &Path, settings: &JobSettings) -> Result<()> {
     if let RunPlace::Named(outer) = &settings.place {
         settings.access.create(outer)?;
     }
@@ -267,7 +267,7 @@ fn automatic<E: Experiment>(experiment: &E) -> Result<PathBuf> {
     });
     let hash = &Digest::canonical("darkqa.command/2", &facts)?.to_string()[..8];
     let base = Path::new(RESULTS);
-    Ok(store::find(base, hash).unwrap_or_else(|| {
+    Ok(darkqa_store::find(base, hash).unwrap_or_else(|| {
         let time = Timestamp::now().strftime("%Y%m%d-%H%M%S");
         let (models, data) = (models_label(&settings.ask), experiment.data());
         let name = format!("{time}-{models}-{data}-{hash}");
@@ -290,7 +290,7 @@ fn models_label(ask: &AskSettings) -> String {
 }
 
 /// Allows another address of the endpoint than in the manifest only with `--resume`.
-pub(crate) fn address_change(place: &RunPlace) -> AddressChange {
+pub fn address_change(place: &RunPlace) -> AddressChange {
     match place {
         RunPlace::Resume(_) => AddressChange::Allowed,
         RunPlace::Named(_) | RunPlace::Automatic => AddressChange::Refused,

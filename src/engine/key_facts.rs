@@ -2,16 +2,16 @@
 
 use serde::Serialize;
 
-use crate::ask::ImagePlaces;
-use crate::engine::images::trials::Prompt;
-use crate::engine::models::ModelUnderTest;
-use crate::error::Result;
-use crate::types::{Condition, Digest, QuestionId, TrialKey};
+use crate::images::trials::Prompt;
+use crate::models::ModelUnderTest;
+use darkqa_ask::ImagePlaces;
+use darkqa_base::error::Result;
+use darkqa_base::types::{Condition, Digest, QuestionId, TrialKey};
 
 /// The inputs that affect a reply, from which the key of a trial is computed. Question and condition are included,
 /// because built-in models answer by their names. The fields are sorted by name, as [`Digest::presorted`] requires.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(crate) struct KeyFacts<'a> {
+pub struct KeyFacts<'a> {
     before: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
     behind: Option<&'a str>,
@@ -38,7 +38,7 @@ pub(crate) struct KeyFacts<'a> {
 
 impl<'a> KeyFacts<'a> {
     /// Facts of an open question that is asked for the first time.
-    pub(crate) fn new(
+    pub fn new(
         model: &'a ModelUnderTest,
         question: &'a QuestionId,
         prompt: &'a Prompt,
@@ -60,12 +60,13 @@ impl<'a> KeyFacts<'a> {
     }
 
     /// Sets the choices in the order shown, and the number of earlier trials with the same question.
-    pub(crate) fn with_choices(self, choices: &'a [String], repeat: u32) -> Self {
+    #[must_use]
+    pub fn with_choices(self, choices: &'a [String], repeat: u32) -> Self {
         Self { choices: Some(choices), repeat: (repeat > 0).then_some(repeat), ..self }
     }
 
     /// Computes the key of the trial, a digest of all facts.
-    pub(crate) fn key(&self) -> Result<TrialKey> {
+    pub fn key(&self) -> Result<TrialKey> {
         Digest::presorted("darkqa.trial/2", self).map(Into::into)
     }
 }

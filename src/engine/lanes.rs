@@ -8,22 +8,22 @@ use std::sync::{Arc, Weak};
 use tokio::sync::watch;
 
 use super::costs::Permit;
-use crate::ask::{AskError, Call, Reservation};
-use crate::engine::images::trials::{Item, Stimulus, Trial};
-use crate::engine::images::workers::ThreadArgs;
-use crate::engine::models::ModelUnderTest;
-use crate::engine::open_files::RequestLimit;
-use crate::types::text::counted;
-use crate::types::{LostAttempts, Reply};
+use crate::images::trials::{Item, Stimulus, Trial};
+use crate::images::workers::ThreadArgs;
+use crate::models::ModelUnderTest;
+use crate::open_files::RequestLimit;
+use darkqa_ask::{AskError, Call, Reservation};
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{LostAttempts, Reply};
 
 /// Maximum bytes of images held so that idle endpoints can work ahead of the slowest; chosen: about fifty images of
 /// 1280×720 as PNG.
 const BYTES_AHEAD: usize = 64 << 20;
 
 /// A trial with its stimulus, which it shares with the other trials of its group.
-pub(crate) struct PreparedTrial<I> {
-    pub(crate) trial: Trial<I>,
-    pub(crate) stimulus: Arc<Stimulus>,
+pub struct PreparedTrial<I> {
+    pub trial: Trial<I>,
+    pub stimulus: Arc<Stimulus>,
 }
 
 /// The queue of the models that share an endpoint. The built-in models share one lane.
@@ -44,7 +44,7 @@ struct Lane<I> {
 
 /// Waiting trials and the number in flight, per endpoint, so that a slow endpoint does not hold up the others. All
 /// endpoints share the images of a group, which are made once.
-pub(crate) struct Lanes<'a, I> {
+pub struct Lanes<'a, I> {
     models: &'a [ModelUnderTest],
     by_endpoint: Vec<Lane<I>>,
     /// Index into `by_endpoint`, by index of the model.
@@ -56,7 +56,7 @@ pub(crate) struct Lanes<'a, I> {
 }
 
 impl<'a, I> Lanes<'a, I> {
-    pub(crate) fn new(models: &'a [ModelUnderTest], default_width: usize) -> Self {
+    pub fn new(models: &'a [ModelUnderTest], default_width: usize) -> Self {
         let mut lanes: Vec<Lane<I>> = Vec::new();
         let mut lane_of_model = Vec::new();
         for (index, model) in models.iter().enumerate() {
@@ -82,7 +82,7 @@ impl<'a, I> Lanes<'a, I> {
 
     /// Limits the requests in flight to the connections that this process may open in addition to the files of these
     /// threads. Prints a warning if that is fewer than the settings allow.
-    pub(crate) fn keep_within_open_files(&mut self, threads: ThreadArgs) {
+    pub fn keep_within_open_files(&mut self, threads: ThreadArgs) {
         let Some(RequestLimit { limit, requests }) = RequestLimit::now(threads.count()) else {
             return;
         };
@@ -112,7 +112,7 @@ impl<'a, I> Lanes<'a, I> {
     }
 
     /// Adds the trials of a group.
-    pub(crate) fn extend(&mut self, ready: Vec<PreparedTrial<I>>) {
+    pub fn extend(&mut self, ready: Vec<PreparedTrial<I>>) {
         if let Some(first) = ready.first() {
             let bytes = first.stimulus.images.iter().map(|image| image.facts().bytes).sum();
             self.live_images.push_back((Arc::downgrade(&first.stimulus), bytes));
@@ -124,7 +124,7 @@ impl<'a, I> Lanes<'a, I> {
     }
 
     /// Appends trials that are asked again to the waiting ones; true if there are any.
-    pub(crate) fn requeue(&mut self, again: Vec<PreparedTrial<I>>) -> bool {
+    pub fn requeue(&mut self, again: Vec<PreparedTrial<I>>) -> bool {
         let has_any = !again.is_empty();
         for ready in again {
             let lane = self.lane_of_model[ready.trial.model];
@@ -135,7 +135,7 @@ impl<'a, I> Lanes<'a, I> {
 
     /// Takes the next trial from a lane that has room and is not held by the budget. Trials for which `is_dropped` is
     /// true are dropped; those for which `is_deferred` is true are set aside until [`Self::requeue_deferred`].
-    pub(crate) fn next(
+    pub fn next(
         &mut self,
         is_dropped: impl Fn(&Trial<I>) -> bool,
         is_deferred: impl Fn(&Trial<I>) -> bool,
@@ -162,12 +162,12 @@ impl<'a, I> Lanes<'a, I> {
     }
 
     /// True if any trial is set aside.
-    pub(crate) fn has_deferred(&self) -> bool {
+    pub fn has_deferred(&self) -> bool {
         self.by_endpoint.iter().any(|lane| !lane.deferred.is_empty())
     }
 
     /// Appends the trials that were set aside to the waiting ones.
-    pub(crate) fn requeue_deferred(&mut self) {
+    pub fn requeue_deferred(&mut self) {
         for lane in &mut self.by_endpoint {
             lane.waiting.append(&mut lane.deferred);
         }
@@ -175,7 +175,7 @@ impl<'a, I> Lanes<'a, I> {
 
     /// Returns a trial that the budget does not allow now to its queue, and holds its lane until a trial ends or
     /// [`Self::release`] is called.
-    pub(crate) fn put_back(&mut self, ready: PreparedTrial<I>) {
+    pub fn put_back(&mut self, ready: PreparedTrial<I>) {
         let lane = &mut self.by_endpoint[self.lane_of_model[ready.trial.model]];
         lane.in_flight -= 1;
         lane.is_held = true;
@@ -183,37 +183,37 @@ impl<'a, I> Lanes<'a, I> {
     }
 
     /// Records that a trial of a model has ended, and releases all lanes held by the budget.
-    pub(crate) fn ended(&mut self, model: usize) {
+    pub fn ended(&mut self, model: usize) {
         let lane = &mut self.by_endpoint[self.lane_of_model[model]];
         lane.in_flight = lane.in_flight.saturating_sub(1);
         self.release();
     }
 
     /// True if the budget holds a lane whose endpoint has room for another request.
-    pub(crate) fn is_held_back(&self) -> bool {
+    pub fn is_held_back(&self) -> bool {
         self.by_endpoint.iter().any(|lane| lane.is_held && lane.in_flight < self.width(lane))
     }
 
     /// Releases all lanes held by the budget, so that their next trials are tried again.
-    pub(crate) fn release(&mut self) {
+    pub fn release(&mut self) {
         for lane in &mut self.by_endpoint {
             lane.is_held = false;
         }
     }
 
     /// True if no trial is waiting; trials set aside do not count.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.by_endpoint.iter().all(|lane| lane.waiting.is_empty())
     }
 
     /// True if trials are waiting. Once [`Self::next`] has returned `None`, none of them may be sent now.
-    pub(crate) fn has_waiting(&self) -> bool {
+    pub fn has_waiting(&self) -> bool {
         !self.is_empty()
     }
 
     /// True if another group should be prepared: no trial is waiting, or a lane of a model that is not stopped has none
     /// waiting and the images held are smaller than [`BYTES_AHEAD`].
-    pub(crate) fn wants_more(&mut self, is_stopped: impl Fn(usize) -> bool) -> bool {
+    pub fn wants_more(&mut self, is_stopped: impl Fn(usize) -> bool) -> bool {
         if self.is_empty() {
             return true;
         }

@@ -8,30 +8,30 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::{Value, json};
 
 use super::models::ModelUnderTest;
-use crate::ask::{Prices, by_flag};
-use crate::engine::experiment::{DetailOf, Experiment};
-use crate::engine::images::frames::input_summary;
-use crate::engine::images::recipes::Recipe;
-use crate::engine::images::recipes::image_recipe::ImageWords;
-use crate::engine::settings::JobSettings;
-use crate::error::Result;
-use crate::pictures::Scaling;
-use crate::runs::renamed::{self, SettingsChange, is_kept};
-use crate::runs::shard::tasks_setting;
-use crate::store::now;
-use crate::types::degradations::Kind;
-use crate::types::manifests::{Columns, Counts, PngForm, RunManifest, RunPart, Status};
-use crate::types::{Degradation, Digest, InputSummary, ListedModel, PairDark, ProfileName, StoredDetail as _};
-use darkqa_enhance::{self, SizeArgs, Tiling};
+use crate::experiment::{DetailOf, Experiment};
+use crate::images::frames::input_summary;
+use crate::images::recipes::Recipe;
+use crate::images::recipes::image_recipe::ImageWords;
+use crate::settings::JobSettings;
+use darkqa_ask::{Prices, by_flag};
+use darkqa_base::error::Result;
+use darkqa_base::types::degradations::Kind;
+use darkqa_base::types::manifests::{Columns, Counts, PngForm, RunManifest, RunPart, Status};
+use darkqa_base::types::{Degradation, Digest, InputSummary, ListedModel, PairDark, ProfileName, StoredDetail as _};
+use darkqa_enhance::{SizeArgs, Tiling};
 use darkqa_light::{KindSettings, Synthesis, version};
+use darkqa_pictures::Scaling;
+use darkqa_runs::renamed::{self, SettingsChange, is_kept};
+use darkqa_runs::shard::tasks_setting;
 use darkqa_score::answers::record::Detail as _;
+use darkqa_store::now;
 
 /// The manifest of a run that starts, or that continues the run of the `stored` manifest. It keeps the date, columns
 /// and image flags of the stored one; after a complete run, it keeps everything but the identity.
 ///
 /// # Errors
 /// If a number in the settings of a model is not finite.
-pub(crate) fn run_manifest<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> Result<RunManifest> {
+pub fn run_manifest<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> Result<RunManifest> {
     let job = experiment.settings();
     let mut settings = settings(job);
     let notes: BTreeMap<String, Value> =
@@ -119,7 +119,7 @@ fn inputs<E: Experiment>(experiment: &E) -> Option<InputSummary> {
 }
 
 /// Marks a run as started, with the settings of this command and this version.
-pub(crate) fn mark_started<E: Experiment>(experiment: &E, manifest: &mut RunManifest) {
+pub fn mark_started<E: Experiment>(experiment: &E, manifest: &mut RunManifest) {
     manifest.status = Status::Started;
     manifest.updated = now();
     env!("CARGO_PKG_VERSION").clone_into(&mut manifest.version);
@@ -150,7 +150,7 @@ fn merged_flags(stored: &ImageWords, current: ImageWords) -> ImageWords {
 const PAPER_KINDS: [Kind; 2] = [Kind::Exposure, Kind::Sensor];
 
 /// Settings of a recipe that all trials share.
-pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
+pub fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
     let scaling = match recipe.scaling {
         Scaling::Never => None,
         Scaling::MaxSide(side) => Some(("--max-side", json!(side))),
@@ -166,7 +166,7 @@ pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
 }
 
 /// Definitions of the models, enhancers, noise profiles and other kinds of degradation of a run.
-pub(crate) fn columns<'a>(
+pub fn columns<'a>(
     models: impl IntoIterator<Item = &'a ModelUnderTest>,
     recipe: &Recipe,
     settings: &JobSettings,
@@ -220,7 +220,7 @@ pub(crate) fn columns<'a>(
 
 /// Settings by flag that affect the replies of a model, other than question and images, and the address of its
 /// endpoint.
-pub(crate) fn model_definition(model: &ModelUnderTest) -> Value {
+pub fn model_definition(model: &ModelUnderTest) -> Value {
     let mut content = model.model.content();
     if let (Some(address), Some(fields)) = (model.address(), content.as_object_mut()) {
         *fields = by_flag(std::mem::take(fields));
@@ -231,7 +231,7 @@ pub(crate) fn model_definition(model: &ModelUnderTest) -> Value {
 
 /// Settings by flag that affect the pixels of an enhancer. Automatic tiling is left out: it changes at most one sample
 /// in a thousand, compared with enhancement of the whole image.
-pub(crate) fn enhancer_definition(digest: &Digest, size: &SizeArgs) -> Value {
+pub fn enhancer_definition(digest: &Digest, size: &SizeArgs) -> Value {
     let tile = (size.tile != Tiling::Auto).then(|| size.tile.to_string());
     let mut content = json!({
         "--llie": digest,
@@ -267,7 +267,7 @@ fn kind_definition(kind: Kind, kinds: &KindSettings) -> Value {
 }
 
 /// Settings that do not affect replies, but may explain the course of a run.
-pub(crate) fn settings(job: &JobSettings) -> BTreeMap<String, Value> {
+pub fn settings(job: &JobSettings) -> BTreeMap<String, Value> {
     let mut settings = vec![
         ("--concurrency", json!(job.concurrency.to_string())),
         ("--max-failures", json!(job.money.max_failures)),
@@ -291,7 +291,7 @@ pub(crate) fn settings(job: &JobSettings) -> BTreeMap<String, Value> {
 }
 
 /// Operating system and processor of this machine.
-pub(crate) fn platform() -> BTreeMap<String, String> {
+pub fn platform() -> BTreeMap<String, String> {
     let facts = [("system", std::env::consts::OS), ("processor", std::env::consts::ARCH)];
     facts.map(|(fact, value)| (fact.to_owned(), value.to_owned())).into()
 }

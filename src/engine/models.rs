@@ -18,43 +18,43 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
-use crate::ask::{Endpoint, Model, Parameters, Price, Prices, Remote, Script, Server, Unpriced};
-use crate::engine::images::trials::{Item, Stimulus, Trial};
-use crate::error::{Error, Result};
-use crate::runs::renamed::{self, ADAPTED_FOR, CHANGED_FOR, REFUSED_FOR};
-use crate::types::text::{is_other_model, is_same_name};
-use crate::types::{Condition, Record, Reply, View};
+use crate::images::trials::{Item, Stimulus, Trial};
+use darkqa_ask::{Endpoint, Model, Parameters, Price, Prices, Remote, Script, Server, Unpriced};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::text::{is_other_model, is_same_name};
+use darkqa_base::types::{Condition, Record, Reply, View};
+use darkqa_runs::renamed::{self, ADAPTED_FOR, CHANGED_FOR, REFUSED_FOR};
 
-pub(crate) use asking::AskingArgs;
-pub(crate) use check::{check, describe};
-pub(crate) use entry::{RunDefault, run_defaults};
-pub(crate) use name::{ModelArgs, ModelName};
-pub(crate) use settings::{AskSettings, KeyUse, ResolveContext, TextBaseline};
+pub use asking::AskingArgs;
+pub use check::{check, describe};
+pub use entry::{RunDefault, run_defaults};
+pub use name::{ModelArgs, ModelName};
+pub use settings::{AskSettings, KeyUse, ResolveContext, TextBaseline};
 
 /// Name in messages for the endpoint of built-in models.
 const BUILT_IN: &str = "built-in models";
 
 /// An opened model, with its view: with or without images.
 #[derive(Debug, Clone)]
-pub(crate) struct ModelUnderTest {
-    pub(crate) model: Arc<Model>,
+pub struct ModelUnderTest {
+    pub model: Arc<Model>,
     /// The name in records and tables.
-    pub(crate) name: Arc<str>,
+    pub name: Arc<str>,
     /// Digest of the settings that affect the model's replies ([`Model::digest`]). Cached, because every trial key
     /// contains it.
-    pub(crate) digest: Arc<str>,
-    pub(crate) view: View,
+    pub digest: Arc<str>,
+    pub view: View,
     /// The endpoint; `None` for a built-in model.
-    pub(crate) server: Option<Arc<Server>>,
+    pub server: Option<Arc<Server>>,
     /// The model's own price; `None` for the price in the table.
-    pub(crate) price: Option<Price>,
+    pub price: Option<Price>,
     /// Number of questions that the model is asked; `None` for all.
-    pub(crate) limit: Option<usize>,
+    pub limit: Option<usize>,
 }
 
 impl ModelUnderTest {
     /// A model under its own name. `server` is its endpoint if it is remote, and ignored for built-in models.
-    pub(crate) fn new(model: Model, view: View, server: Option<&Arc<Server>>) -> Result<Self> {
+    pub fn new(model: Model, view: View, server: Option<&Arc<Server>>) -> Result<Self> {
         let server = server.filter(|_| model.is_remote());
         Ok(Self {
             digest: model.digest()?.to_string().into(),
@@ -68,18 +68,18 @@ impl ModelUnderTest {
     }
 
     /// Addresses of the endpoint, separated by spaces; `None` for a built-in model.
-    pub(crate) fn address(&self) -> Option<String> {
+    pub fn address(&self) -> Option<String> {
         let server = self.server.as_ref();
         server.map(|server| server.addresses().join(" "))
     }
 
     /// Name of the endpoint in messages: its addresses, or [`BUILT_IN`].
-    pub(crate) fn endpoint_name(&self) -> String {
+    pub fn endpoint_name(&self) -> String {
         self.address().unwrap_or_else(|| BUILT_IN.to_owned())
     }
 
     /// Price of the model's tokens; `None` if it is built in or the price is unknown.
-    pub(crate) fn price(&self, prices: &Prices) -> Option<Price> {
+    pub fn price(&self, prices: &Prices) -> Option<Price> {
         self.priced(prices).ok().flatten()
     }
 
@@ -87,7 +87,7 @@ impl ModelUnderTest {
     ///
     /// # Errors
     /// The reason why the price is unknown.
-    pub(crate) fn priced(&self, prices: &Prices) -> std::result::Result<Option<Price>, Unpriced> {
+    pub fn priced(&self, prices: &Prices) -> std::result::Result<Option<Price>, Unpriced> {
         if !self.model.is_remote() {
             return Ok(None);
         }
@@ -99,12 +99,12 @@ impl ModelUnderTest {
     }
 
     /// The record of a trial, without an outcome.
-    pub(crate) fn blank<I: Item>(&self, trial: &Trial<I>, stimulus: &Stimulus) -> Record<I::Detail> {
+    pub fn blank<I: Item>(&self, trial: &Trial<I>, stimulus: &Stimulus) -> Record<I::Detail> {
         Record { max_tokens: self.model.changed_limit(), ..I::blank(trial, stimulus, &self.name) }
     }
 
     /// True if the model is asked the question with this index among the selected ones.
-    pub(crate) fn is_asked(&self, place: usize) -> bool {
+    pub fn is_asked(&self, place: usize) -> bool {
         self.limit.is_none_or(|limit| place < limit)
     }
 }
@@ -114,7 +114,7 @@ impl ModelUnderTest {
 ///
 /// # Errors
 /// If a model cannot be opened, or two models differ in no setting that affects replies.
-pub(crate) fn open_all(
+pub fn open_all(
     ask: &AskSettings,
     added: &[ModelName],
     built_in: impl Fn(&ModelName) -> Result<Model>,
@@ -193,16 +193,13 @@ impl Endpoints {
 
 /// The models that are asked in a condition, each with its index in `models`. Without a condition, those that are asked
 /// without images.
-pub(crate) fn asked_in<'a>(
-    models: &'a [ModelUnderTest],
-    condition: Option<&Condition>,
-) -> Vec<(usize, &'a ModelUnderTest)> {
+pub fn asked_in<'a>(models: &'a [ModelUnderTest], condition: Option<&Condition>) -> Vec<(usize, &'a ModelUnderTest)> {
     let view = condition.map_or(View::Blind, |_| View::Image);
     models.iter().enumerate().filter(|(_, model)| model.view == view).collect()
 }
 
 /// Opens an endpoint.
-pub(crate) fn endpoint(server: &Server) -> Result<Arc<Endpoint>> {
+pub fn endpoint(server: &Server) -> Result<Arc<Endpoint>> {
     Endpoint::from_addresses(server.replicas.clone(), server.sending).map(Arc::new)
 }
 
@@ -210,7 +207,7 @@ pub(crate) fn endpoint(server: &Server) -> Result<Arc<Endpoint>> {
 ///
 /// # Errors
 /// If the model answers multiple-choice questions only, or cannot be opened.
-pub(crate) fn open(name: &ModelName, endpoint: Option<&Arc<Endpoint>>, parameters: &Parameters) -> Result<Model> {
+pub fn open(name: &ModelName, endpoint: Option<&Arc<Endpoint>>, parameters: &Parameters) -> Result<Model> {
     match name {
         ModelName::Script(path) => Ok(Model::Script(Script::load(path)?)),
         ModelName::Remote(name) => {
@@ -227,7 +224,7 @@ pub(crate) fn open(name: &ModelName, endpoint: Option<&Arc<Endpoint>>, parameter
 
 /// Adds to the settings of a manifest which flags of each model the server refused, and which settings changed within
 /// the run.
-pub(crate) fn note_changes(models: &[&ModelUnderTest], settings: &mut BTreeMap<String, Value>) {
+pub fn note_changes(models: &[&ModelUnderTest], settings: &mut BTreeMap<String, Value>) {
     for model in models {
         let forced = model.model.forced();
         if !forced.is_empty() {
@@ -246,7 +243,7 @@ pub(crate) fn note_changes(models: &[&ModelUnderTest], settings: &mut BTreeMap<S
 
 /// Changes to requests that the endpoint required, by model, as settings for the manifest. The changes of a model that
 /// is asked both with and without images are merged.
-pub(crate) fn adapted(models: &[ModelUnderTest]) -> impl Iterator<Item = (String, Value)> {
+pub fn adapted(models: &[ModelUnderTest]) -> impl Iterator<Item = (String, Value)> {
     let mut by_name: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for model in models {
         let name = format!("{ADAPTED_FOR}{}", model.name);

@@ -9,12 +9,12 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::ask::{Call, Local, LocalAnswer, Random};
-use crate::data::{DataSource, Dataset};
-use crate::error::{Error, Result};
-use crate::types::replies::OBSERVER;
-use crate::types::values::Recent;
-use crate::types::{AnswerSource, Control, Digest, FrameId, Labels, Observed, Question, Rgb};
+use darkqa_ask::{Call, Local, LocalAnswer, Random};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::replies::OBSERVER;
+use darkqa_base::types::values::Recent;
+use darkqa_base::types::{AnswerSource, Control, Digest, FrameId, Labels, Observed, Question, Rgb};
+use darkqa_data::{DataSource, Dataset};
 use darkqa_enhance::{Network, ROOM_NET, RuntimeSearch};
 use darkqa_questions::colors::Palette;
 use darkqa_questions::observer::controls::control_image;
@@ -28,7 +28,7 @@ use darkqa_questions::rules::Rules;
 const OBSERVATIONS: usize = 64;
 
 /// The data set, the rules and the caches that the observer and its controls share.
-pub(crate) struct Observer {
+pub struct Observer {
     dataset: Arc<Dataset>,
     labels: Labels,
     rules: Rules,
@@ -38,7 +38,7 @@ pub(crate) struct Observer {
 }
 
 /// Name of the observer, or of one of its controls, in records and tables.
-pub(crate) fn name(control: Option<Control>) -> String {
+pub fn name(control: Option<Control>) -> String {
     control.map_or_else(|| OBSERVER.to_owned(), Control::model_name)
 }
 
@@ -47,7 +47,7 @@ impl Observer {
     ///
     /// # Errors
     /// If the frames have no maps, or a question does not follow from the rules.
-    pub(crate) fn open(
+    pub fn open(
         dataset: &Arc<Dataset>,
         place: &DataSource,
         further: &[PathBuf],
@@ -85,7 +85,7 @@ impl Observer {
 
     /// The observer as a model, or one of its controls. The seed of `prior` determines the guesses and the random
     /// choices of a control.
-    pub(crate) fn model(self: &Arc<Self>, control: Option<Control>, prior: Random) -> Local {
+    pub fn model(self: &Arc<Self>, control: Option<Control>, prior: Random) -> Local {
         let (observer, seed) = (Arc::clone(self), prior.seed);
         let rules = self.rules.digest();
         let mut parts = vec![VERSION.to_le_bytes().to_vec(), rules.as_bytes().to_vec()];
@@ -153,7 +153,7 @@ fn observed(observation: &Observation, choice: Option<usize>) -> Observed {
 }
 
 /// The name in flags, records and tables.
-pub(crate) const NAME: &str = "room-net";
+pub const NAME: &str = "room-net";
 
 /// Version of the code that prepares the input and answers from the maps; part of the digest of the model.
 const NET_VERSION: u32 = 1;
@@ -168,7 +168,7 @@ const ROOMS: [&str; 6] = ["bedroom", "bathroom", "kitchen", "living room", "dini
 const PREDICTIONS: usize = 16;
 
 /// The network and the rules by which its maps answer a question.
-pub(crate) struct RoomNet {
+pub struct RoomNet {
     runtime: RuntimeSearch,
     /// Loaded when the first image is shown.
     network: Mutex<Option<Arc<Network>>>,
@@ -182,7 +182,7 @@ impl RoomNet {
     ///
     /// # Errors
     /// If the names of colours cannot be read.
-    pub(crate) fn new(runtime: RuntimeSearch, rules: Rules) -> Result<Arc<Self>> {
+    pub fn new(runtime: RuntimeSearch, rules: Rules) -> Result<Arc<Self>> {
         Ok(Arc::new(Self {
             runtime,
             network: Mutex::default(),
@@ -194,7 +194,7 @@ impl RoomNet {
 
     /// The network as a model. If the image does not show the answer, the model guesses as `prior` does, and the record
     /// marks the guess.
-    pub(crate) fn model(self: &Arc<Self>, prior: Random) -> Local {
+    pub fn model(self: &Arc<Self>, prior: Random) -> Local {
         let net = Arc::clone(self);
         let digest = Digest::from_parts([&NET_VERSION.to_le_bytes()[..], ROOM_NET, self.rules.digest().as_bytes()]);
         Local::new(

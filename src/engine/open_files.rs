@@ -19,17 +19,17 @@ const FALLBACK_LIMIT: libc::rlim_t = 10_240;
 
 /// How many requests can be in flight within the limit of open files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct RequestLimit {
+pub struct RequestLimit {
     /// Maximum number of open files of this process.
-    pub(crate) limit: usize,
+    pub limit: usize,
     /// Number of requests in flight that fit within the limit; at least one.
-    pub(crate) requests: usize,
+    pub requests: usize,
 }
 
 impl RequestLimit {
     /// Raises the limit, and subtracts the files that are open now and those reserved for `threads` image threads.
     /// `None` if the limit is unknown or infinite.
-    pub(crate) fn now(threads: usize) -> Option<Self> {
+    pub fn now(threads: usize) -> Option<Self> {
         let limit = raise_limit()?;
         Some(Self::within(limit, open_files(), threads))
     }
@@ -46,7 +46,7 @@ impl RequestLimit {
 /// infinite.
 #[cfg(unix)]
 #[expect(unsafe_code, reason = "a limit of the operating system")]
-pub(crate) fn raise_limit() -> Option<usize> {
+pub fn raise_limit() -> Option<usize> {
     let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
     // SAFETY: each call only reads or writes the `rlimit` structure passed to it.
     unsafe {
@@ -66,7 +66,7 @@ pub(crate) fn raise_limit() -> Option<usize> {
 
 /// `None`: this system sets no limit of open files.
 #[cfg(not(unix))]
-pub(crate) fn raise_limit() -> Option<usize> {
+pub fn raise_limit() -> Option<usize> {
     None
 }
 

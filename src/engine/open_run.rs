@@ -7,41 +7,41 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Instant;
 
-use crate::ask::{HeldBack, ImageLimit};
-use crate::engine::batch::journal::Journal;
-use crate::engine::circuit_breaker::EndReason;
-use crate::engine::costs::{Budget, InFlightCost, RunModels};
-use crate::engine::dispatch::{Dispatcher, TrialCounts};
-use crate::engine::experiment::{DetailOf, Experiment};
-use crate::engine::image_cache::ImageStore;
-use crate::engine::images::enhancement::enhancers::EnhancerModels;
-use crate::engine::images::frames::Source;
-use crate::engine::images::image_pipeline::ImagePipeline;
-use crate::engine::images::notes::MissingNotes;
-use crate::engine::images::progress::Progress;
-use crate::engine::images::recipes::Maker;
-use crate::engine::images::stored::StoredImages;
-use crate::engine::images::timings::{ImageSteps, Timings};
-use crate::engine::images::trials::Plan;
-use crate::engine::images::workers::Workers;
-use crate::engine::models::{self, ModelUnderTest};
-use crate::engine::reply_checks::ReplyChecks;
-use crate::engine::settings::JobSettings;
-use crate::engine::stored_keys::{self, lost_for_good, truncated};
-use crate::engine::{dark_already, manifest};
-use crate::error::Result;
-use crate::runs::missing_thumbnails::MissingThumbnails;
-use crate::runs::outcome::{Outcome, OverBudget};
-use crate::runs::record_table;
-use crate::runs::shard::{Shard, ShardBudget};
-use crate::runs::shard_records::OtherShards;
-use crate::runs::stored::StoredRun;
-use crate::store::{self, Store, StoredTrial, now};
-use crate::types::manifests::{Counts, PngForm, RunManifest};
-use crate::types::text::{counted, money, plural};
-use crate::types::{Digest, EnhancerName, TrialKey, View};
+use crate::batch::journal::Journal;
+use crate::circuit_breaker::EndReason;
+use crate::costs::{Budget, InFlightCost, RunModels};
+use crate::dispatch::{Dispatcher, TrialCounts};
+use crate::experiment::{DetailOf, Experiment};
+use crate::image_cache::ImageStore;
+use crate::images::enhancement::enhancers::EnhancerModels;
+use crate::images::frames::Source;
+use crate::images::image_pipeline::ImagePipeline;
+use crate::images::notes::MissingNotes;
+use crate::images::progress::Progress;
+use crate::images::recipes::Maker;
+use crate::images::stored::StoredImages;
+use crate::images::timings::{ImageSteps, Timings};
+use crate::images::trials::Plan;
+use crate::images::workers::Workers;
+use crate::models::{self, ModelUnderTest};
+use crate::reply_checks::ReplyChecks;
+use crate::settings::JobSettings;
+use crate::stored_keys::{self, lost_for_good, truncated};
+use crate::{dark_already, manifest};
+use darkqa_ask::{HeldBack, ImageLimit};
+use darkqa_base::error::Result;
+use darkqa_base::types::manifests::{Counts, PngForm, RunManifest};
+use darkqa_base::types::text::{counted, money, plural};
+use darkqa_base::types::{Digest, EnhancerName, TrialKey, View};
 use darkqa_enhance::{Enhancer, Usage};
+use darkqa_runs::missing_thumbnails::MissingThumbnails;
+use darkqa_runs::outcome::{Outcome, OverBudget};
+use darkqa_runs::record_table;
+use darkqa_runs::shard::{Shard, ShardBudget};
+use darkqa_runs::shard_records::OtherShards;
+use darkqa_runs::stored::StoredRun;
 use darkqa_score::answers::MIN_REPLIES;
+use darkqa_store::{Store, StoredTrial, now};
 
 /// Share of `--max-cost` below which a cost that no server stated is not mentioned; chosen.
 const SMALL_SHARE: f64 = 0.01;
@@ -51,33 +51,33 @@ const SMALL_SHARE: f64 = 0.01;
 const UNTOUCHED_FIRST: usize = 128;
 
 /// A run folder that is locked for this process, and the state needed to ask its trials.
-pub(crate) struct OpenRun<'a, E: Experiment> {
-    pub(crate) experiment: &'a E,
-    pub(crate) progress: &'a Progress,
-    pub(crate) enhancers: EnhancerModels<'a>,
-    pub(crate) store: Store<DetailOf<E>>,
+pub struct OpenRun<'a, E: Experiment> {
+    pub experiment: &'a E,
+    pub progress: &'a Progress,
+    pub enhancers: EnhancerModels<'a>,
+    pub store: Store<DetailOf<E>>,
     /// True if notes about images were lost before this command.
-    pub(crate) lacks_notes: bool,
-    pub(crate) manifest: RunManifest,
+    pub lacks_notes: bool,
+    pub manifest: RunManifest,
     /// Keys of all trials planned so far, in all phases.
-    pub(crate) keys: HashSet<TrialKey>,
+    pub keys: HashSet<TrialKey>,
     /// The image store; `None` without one.
-    pub(crate) images: Option<ImageStore>,
+    pub images: Option<ImageStore>,
     /// Numbers of the stored trials, if this command had none to ask; otherwise `None`.
-    pub(crate) unasked: Option<Counts>,
+    pub unasked: Option<Counts>,
 }
 
 /// The trials of a phase that still have to be asked.
-pub(crate) struct Remaining<E: Experiment> {
-    pub(crate) plan: Plan<E::Item>,
-    pub(crate) stored: Vec<StoredTrial>,
+pub struct Remaining<E: Experiment> {
+    pub plan: Plan<E::Item>,
+    pub stored: Vec<StoredTrial>,
     /// Number of trials that wait for a batch and are therefore not in `plan`.
-    pub(crate) in_batch: usize,
+    pub in_batch: usize,
 }
 
 impl<E: Experiment> OpenRun<'_, E> {
     /// Asks the remaining trials, phase by phase.
-    pub(crate) fn ask(mut self) -> Result<Outcome> {
+    pub fn ask(mut self) -> Result<Outcome> {
         let (mut end, mut stopped) = (EndReason::AllAsked, Vec::new());
         let mut has_asked = false;
         for phase in 0..E::PHASES.len() {
@@ -122,7 +122,7 @@ impl<E: Experiment> OpenRun<'_, E> {
     }
 
     /// Records in the manifest by how much the run exceeded `--max-cost`, and how much a shard has left of its share.
-    pub(crate) fn note_cost(&mut self) -> Result<()> {
+    pub fn note_cost(&mut self) -> Result<()> {
         let settings = self.experiment.settings();
         let Some(limit) = settings.money.max_cost else {
             return Ok(());
@@ -175,7 +175,7 @@ impl<E: Experiment> OpenRun<'_, E> {
 
     /// The trials of a phase that have no reply and do not wait for a batch. Replies that shards of another division
     /// have are copied first.
-    pub(crate) fn remaining(&mut self, phase: usize) -> Result<Remaining<E>> {
+    pub fn remaining(&mut self, phase: usize) -> Result<Remaining<E>> {
         let mut stored = self.store.trials()?;
         let mut answered = stored_keys::answered(&stored);
         let mut again = truncated(&stored, self.experiment.models(phase));
@@ -265,13 +265,13 @@ impl<E: Experiment> OpenRun<'_, E> {
                 "{in_batch} trial{verb} waiting for a batch and not asked here; import the replies with batch run, batch fetch or batch \
                  import; batch cancel {} ends what batch run has submitted, and frees it; or delete {} to ask here",
                 self.store.folder().display(),
-                self.store.folder().join(store::BATCH).display()
+                self.store.folder().join(darkqa_store::BATCH).display()
             );
         }
     }
 
     /// Asks the remaining trials of a phase.
-    pub(crate) fn ask_phase(&mut self, phase: usize, remaining: Remaining<E>) -> Result<EndReason> {
+    pub fn ask_phase(&mut self, phase: usize, remaining: Remaining<E>) -> Result<EndReason> {
         let Remaining { mut plan, stored, .. } = remaining;
         let experiment = self.experiment;
         let settings = experiment.settings();
@@ -357,7 +357,7 @@ impl<E: Experiment> OpenRun<'_, E> {
     }
 
     /// Adds the use of the enhancers to the manifest.
-    pub(crate) fn note_enhancers(&mut self, usages: Vec<(EnhancerName, Usage)>) {
+    pub fn note_enhancers(&mut self, usages: Vec<(EnhancerName, Usage)>) {
         for (name, usage) in usages {
             let name = name.to_string();
             let earlier = self.manifest.enhancers.remove(&name);
@@ -367,7 +367,7 @@ impl<E: Experiment> OpenRun<'_, E> {
     }
 
     /// Writes the numbers of trials into the manifest, so that they are known even if the process is killed.
-    pub(crate) fn write_counts(&mut self, stored: &[StoredTrial]) -> Result<()> {
+    pub fn write_counts(&mut self, stored: &[StoredTrial]) -> Result<()> {
         self.manifest.counts =
             Counts { failed: 0, ..self.counts(stored.iter().map(|trial| (trial.key, trial.failed()))) };
         self.store.write_manifest(&self.manifest)
@@ -432,7 +432,7 @@ impl<E: Experiment> OpenRun<'_, E> {
     }
 
     /// Scores the run, and writes the report into its folder, unless it has the report already.
-    pub(crate) fn finish(self, end: EndReason) -> Result<Outcome> {
+    pub fn finish(self, end: EndReason) -> Result<Outcome> {
         if let Some(outcome) = self.finish_unchanged(&end)? {
             return Ok(outcome);
         }
@@ -476,13 +476,13 @@ fn longer_replies(models: &[&ModelUnderTest], trials: &[StoredTrial]) -> BTreeMa
 }
 
 /// The models of all phases of an experiment.
-pub(crate) fn every_model<E: Experiment>(experiment: &E) -> Vec<&ModelUnderTest> {
+pub fn every_model<E: Experiment>(experiment: &E) -> Vec<&ModelUnderTest> {
     let phases = 0..E::PHASES.len();
     phases.flat_map(|phase| experiment.models(phase)).collect()
 }
 
 /// The image pipeline of an experiment, without an image store, and with the PNG files of a new run.
-pub(crate) fn pipeline<'a, E: Experiment>(
+pub fn pipeline<'a, E: Experiment>(
     experiment: &'a E,
     enhancers: Vec<Enhancer>,
     limit: Option<ImageLimit>,
@@ -504,7 +504,7 @@ pub(crate) fn pipeline<'a, E: Experiment>(
 
 /// The strictest image limit of all endpoints, because each image is made once for all of them; `None` if all models
 /// are built in.
-pub(crate) fn image_limit(settings: &JobSettings) -> Option<ImageLimit> {
+pub fn image_limit(settings: &JobSettings) -> Option<ImageLimit> {
     let limit = settings
         .ask
         .servers()
@@ -528,11 +528,11 @@ pub(crate) fn image_limit(settings: &JobSettings) -> Option<ImageLimit> {
 }
 
 /// The notes about images that a run folder does not have yet.
-pub(crate) fn missing_notes<E: Experiment>(experiment: &E, folder: &Path) -> MissingNotes {
+pub fn missing_notes<E: Experiment>(experiment: &E, folder: &Path) -> MissingNotes {
     let names = experiment.sources().iter().map(|source| &source.name);
-    let thumbnails = MissingThumbnails::new(names, store::read_thumbnails(folder));
+    let thumbnails = MissingThumbnails::new(names, darkqa_store::read_thumbnails(folder));
     let thumbnails = thumbnails.with_objects(&experiment.questions());
-    MissingNotes::new(thumbnails, store::read_fidelity(folder))
+    MissingNotes::new(thumbnails, darkqa_store::read_fidelity(folder))
 }
 
 /// Notes the number of trials that a gateway gave up on in an earlier call.

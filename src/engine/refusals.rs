@@ -13,9 +13,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::lanes::Finished;
 use super::models::ModelUnderTest;
-use crate::ask::{AskError, Reach};
-use crate::engine::lanes::PreparedTrial;
-use crate::types::{Failure, FailureKind, TrialKey};
+use crate::lanes::PreparedTrial;
+use darkqa_ask::{AskError, Reach};
+use darkqa_base::types::{Failure, FailureKind, TrialKey};
 
 /// Status and cause of a refusal.
 type RefusalCause = (u16, String);

@@ -9,17 +9,16 @@ use std::path::PathBuf;
 
 use serde_json::Value;
 
-use crate::ask::{ChangedSetting, Parameters};
-use crate::runs::renamed::{CHANGED_FOR, REFUSED_FOR, changes, key, strings};
-use crate::store;
-use crate::types::manifests::{Columns, JUDGES};
-use crate::types::{Finish, Reply};
+use darkqa_ask::{ChangedSetting, Parameters};
+use darkqa_base::types::manifests::{Columns, JUDGES};
+use darkqa_base::types::{Finish, Reply};
+use darkqa_runs::renamed::{CHANGED_FOR, REFUSED_FOR, changes, key, strings};
 use darkqa_score::choice::llm_match::{Protocol, mark};
 use darkqa_score::choice::open_answer;
 
 /// Checks of the replies of a phase, each of which warns once.
 #[derive(Debug, Clone)]
-pub(crate) struct ReplyChecks {
+pub struct ReplyChecks {
     /// The flag that sets the token limit.
     flag: &'static str,
     truncation: TruncationCheck,
@@ -30,12 +29,12 @@ pub(crate) struct ReplyChecks {
 impl ReplyChecks {
     /// Checks without replies, for models whose token limit this flag sets, and for replies that this protocol reads as
     /// marks.
-    pub(crate) fn new(flag: &'static str, protocol: Option<Protocol>) -> Self {
+    pub fn new(flag: &'static str, protocol: Option<Protocol>) -> Self {
         Self { flag, truncation: TruncationCheck::new(flag), marks: protocol.map(MarkCheck::new) }
     }
 
     /// Counts a reply.
-    pub(crate) fn count(&mut self, reply: &Reply) {
+    pub fn count(&mut self, reply: &Reply) {
         if let Some(problem) = self.marks.as_mut().and_then(|marks| marks.count(reply)) {
             tracing::warn!("{}", problem.words(self.flag));
             if problem.cause == Cause::Limit {
@@ -206,13 +205,13 @@ const SAMPLING: [&str; 5] = ["--temperature", "--top-p", "--sampling-seed", "--m
 /// The run in the folder of a command; empty without one, or if its manifest cannot be read, which opening the folder
 /// reports.
 #[derive(Debug, Default)]
-pub(crate) struct Continuation {
+pub struct Continuation {
     /// Columns of its manifest.
-    pub(crate) columns: Columns,
+    pub columns: Columns,
     /// Settings of its manifest.
-    pub(crate) settings: BTreeMap<String, Value>,
+    pub settings: BTreeMap<String, Value>,
     /// Its folder; `None` without one.
-    pub(crate) folder: Option<PathBuf>,
+    pub folder: Option<PathBuf>,
 }
 
 impl Continuation {
@@ -221,13 +220,7 @@ impl Continuation {
     ///
     /// They may differ in a larger token limit, in sampling settings that the server refused, and in everything if the
     /// run has no reply of the model (`free_without_replies`).
-    pub(crate) fn accept(
-        &self,
-        column: &str,
-        name: &str,
-        own: &Parameters,
-        free_without_replies: bool,
-    ) -> Option<Parameters> {
+    pub fn accept(&self, column: &str, name: &str, own: &Parameters, free_without_replies: bool) -> Option<Parameters> {
         let stored = self.columns.get(column)?.get(name)?;
         if let Some(grown) = own.raised_from_column(stored) {
             return Some(grown);
@@ -261,10 +254,10 @@ impl Continuation {
     /// Number of replies of a model in the run; `None` if a batch may bring more or they cannot be read.
     fn replies(&self, name: &str) -> Option<usize> {
         let folder = self.folder.as_ref()?;
-        if store::has_batches(folder) {
+        if darkqa_store::has_batches(folder) {
             return None;
         }
-        store::reply_count(folder, name).ok()
+        darkqa_store::reply_count(folder, name).ok()
     }
 }
 

@@ -10,31 +10,30 @@ use clap::Args;
 use serde_json::Value;
 
 use super::reply_checks::Continuation;
-use crate::ask::{AccessArgs, ConcurrencyBounds, Constrain, Parameters, RequestArgs, Sending, SettingsOrigin};
-use crate::engine::costs::{MoneyArgs, MoneySettings};
-use crate::engine::image_cache::StoreArgs;
-use crate::engine::images::enhancement::enhancers;
-use crate::engine::images::enhancement::enhancers::EnhancerRunArgs;
-use crate::engine::images::recipes::image_recipe::ImageWords;
-use crate::engine::images::trials::check_used;
-use crate::engine::models::{AskSettings, AskingArgs, KeyUse, ModelArgs, ModelName, ResolveContext, TextBaseline};
-use crate::error::{Error, Result};
-use crate::files::FolderAccess;
-use crate::pictures::{ImageArgs, PayloadFormat};
-use crate::runs::batch_system::TaskRange;
-use crate::runs::outcome::{PrintArgs, RecordTable, StdoutFormat};
-use crate::runs::resolved_shard::ResolvedShard;
-use crate::runs::run_plan::RunPlan;
-use crate::runs::shard::Shard;
-use crate::store;
-use crate::types::flags::seconds;
-use crate::types::{Decides, SetLight, View};
+use crate::costs::{MoneyArgs, MoneySettings};
+use crate::image_cache::StoreArgs;
+use crate::images::enhancement::enhancers;
+use crate::images::enhancement::enhancers::EnhancerRunArgs;
+use crate::images::recipes::image_recipe::ImageWords;
+use crate::images::trials::check_used;
+use crate::models::{AskSettings, AskingArgs, KeyUse, ModelArgs, ModelName, ResolveContext, TextBaseline};
+use darkqa_ask::{AccessArgs, ConcurrencyBounds, Constrain, Parameters, RequestArgs, Sending, SettingsOrigin};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::FolderAccess;
+use darkqa_base::types::flags::seconds;
+use darkqa_base::types::{Decides, SetLight, View};
 use darkqa_enhance::{EnhancerArgs, ModelFile};
 use darkqa_light::{LightArgs, LightSettings};
+use darkqa_pictures::{ImageArgs, PayloadFormat};
+use darkqa_runs::batch_system::TaskRange;
+use darkqa_runs::outcome::{PrintArgs, RecordTable, StdoutFormat};
+use darkqa_runs::resolved_shard::ResolvedShard;
+use darkqa_runs::run_plan::RunPlan;
+use darkqa_runs::shard::Shard;
 
 /// The flags that every experiment has.
 #[derive(Debug, Args)]
-pub(crate) struct JobArgs {
+pub struct JobArgs {
     /// Levels and kinds of degradation.
     #[command(flatten)]
     pub light: LightArgs,
@@ -91,7 +90,7 @@ pub(crate) struct JobArgs {
 /// Flags that distribute a job over processes.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Scale")]
-pub(crate) struct ScaleArgs {
+pub struct ScaleArgs {
     /// Run shard I of N, split by frames or walks: I/N; auto/N or auto takes the numbers of the batch system (Slurm
     /// arrays, indexed Kubernetes jobs); none runs everything. --rpm, --tpm and --max-cost apply to all shards
     /// together. With another N, replies of earlier shards are copied; default: auto in a Slurm array, else none
@@ -112,7 +111,7 @@ pub(crate) struct ScaleArgs {
 /// Flags of the run folder and of the output.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Output")]
-pub(crate) struct OutputArgs {
+pub struct OutputArgs {
     /// Run folder; default: results/TIME-MODEL-DATA-HASH, which the same command finds again
     #[arg(long, value_name = "DIR", conflicts_with = "resume", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
@@ -132,7 +131,7 @@ pub(crate) struct OutputArgs {
 /// Validated settings that all experiments share. Files, environment variables and API keys are read to resolve them,
 /// and not later.
 #[derive(Debug)]
-pub(crate) struct JobSettings {
+pub struct JobSettings {
     /// Levels and kinds of degradation.
     pub light: LightSettings,
     /// The light in which the photographs of the data were taken.
@@ -175,7 +174,7 @@ pub(crate) struct JobSettings {
 
 /// Settings that only some experiments have.
 #[derive(Debug, Default)]
-pub(crate) struct ExperimentSettings {
+pub struct ExperimentSettings {
     /// Constraint that the server enforces on replies.
     pub constrain: Constrain,
     /// Whether to request the probabilities of choices.
@@ -194,7 +193,7 @@ pub(crate) struct ExperimentSettings {
 
 impl JobSettings {
     /// True if at least one model of the run gets images.
-    pub(crate) fn shows_images(&self) -> bool {
+    pub fn shows_images(&self) -> bool {
         self.ask.models.iter().any(|model| model.view == View::Image)
     }
 
@@ -202,7 +201,7 @@ impl JobSettings {
     ///
     /// Opens ONNX Runtime if an enhancer or the model `room-net` needs it, to report a missing library before any slow
     /// step. The folder of an existing run is exempt, because that run may not need the runtime any more.
-    pub(crate) fn enhancers(&self) -> Result<Vec<ModelFile>> {
+    pub fn enhancers(&self) -> Result<Vec<ModelFile>> {
         check_used(&self.light, &self.enhancers)?;
         let files = enhancers::read_models(&self.enhancers.llie)?;
         let exists = match &self.place {
@@ -217,14 +216,14 @@ impl JobSettings {
     }
 
     /// The run in the folder of the command; empty for a new run.
-    pub(crate) fn continuation(&self) -> Continuation {
+    pub fn continuation(&self) -> Continuation {
         self.place.for_shard(self.shard).continuation()
     }
 }
 
 impl JobArgs {
     /// Error for a command line without a model.
-    pub(crate) fn no_model_error(&self) -> Error {
+    pub fn no_model_error(&self) -> Error {
         let remedy = if self.output.resume.is_some() {
             "--resume takes the same flags as the run had, the model's name among them"
         } else {
@@ -260,7 +259,7 @@ impl JobArgs {
     ///
     /// # Errors
     /// [`Error::Usage`] with the invalid flag, variable or file.
-    pub(crate) fn check_models(&self, experiment: &ExperimentSettings) -> Result<Vec<String>> {
+    pub fn check_models(&self, experiment: &ExperimentSettings) -> Result<Vec<String>> {
         let context = ResolveContext {
             typed: &self.typed,
             shard: Shard::WHOLE,
@@ -278,7 +277,7 @@ impl JobArgs {
     ///
     /// # Errors
     /// [`Error::Usage`] with the invalid flag.
-    pub(crate) fn resolve(self, experiment: &ExperimentSettings) -> Result<JobSettings> {
+    pub fn resolve(self, experiment: &ExperimentSettings) -> Result<JobSettings> {
         let place = RunPlace::from(self.output.clone());
         let ResolvedShard { shard, tasks } =
             ResolvedShard::resolve(self.scale.shard.as_deref(), |name| std::env::var(name).ok(), place.folder())?;
@@ -319,11 +318,11 @@ impl JobArgs {
 }
 
 /// Default parent folder of run folders.
-pub(crate) const RESULTS: &str = "results";
+pub const RESULTS: &str = "results";
 
 /// Choice of the run folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum RunPlace {
+pub enum RunPlace {
     /// The folder of an earlier run of the same command, or a new folder.
     Automatic,
     /// This folder, new or existing.
@@ -355,7 +354,7 @@ impl RunPlace {
     ///
     /// # Errors
     /// See [`RunPlan::read`].
-    pub(crate) fn plan(&self) -> Result<Option<RunPlan>> {
+    pub fn plan(&self) -> Result<Option<RunPlan>> {
         self.folder().map_or(Ok(None), RunPlan::read)
     }
 
@@ -363,7 +362,7 @@ impl RunPlace {
     /// that error.
     fn continuation(&self) -> Continuation {
         Continuation {
-            columns: self.read_or_default(store::read_columns),
+            columns: self.read_or_default(darkqa_store::read_columns),
             settings: self.settings(),
             folder: self.folder().map(Path::to_owned),
         }
@@ -371,7 +370,7 @@ impl RunPlace {
 
     /// Settings in the manifest of the named folder; empty in the same cases as [`continuation`](Self::continuation).
     fn settings(&self) -> BTreeMap<String, Value> {
-        self.read_or_default(store::read_settings)
+        self.read_or_default(darkqa_store::read_settings)
     }
 
     /// Reads the manifest of the named folder; the default if no folder is named or reading fails.
@@ -406,7 +405,7 @@ impl RunPlace {
 
     /// Choice for a shard: a subfolder of the folder of the whole run.
     #[must_use]
-    pub(crate) fn for_shard(&self, shard: Shard) -> Self {
+    pub fn for_shard(&self, shard: Shard) -> Self {
         match self {
             Self::Named(path) if shard.is_part() => Self::Named(path.join(shard.folder())),
             Self::Resume(path) if shard.is_part() => Self::Resume(path.join(shard.folder())),

@@ -2,13 +2,13 @@
 
 use std::collections::{HashMap, HashSet};
 
-use crate::engine::models::ModelUnderTest;
-use crate::engine::settings::JobSettings;
-use crate::store::StoredTrial;
-use crate::types::TrialKey;
+use crate::models::ModelUnderTest;
+use crate::settings::JobSettings;
+use darkqa_base::types::TrialKey;
+use darkqa_store::StoredTrial;
 
 /// Keys of the trials without a reply that were charged as often as `--retries paid` allows.
-pub(crate) fn lost_for_good(stored: &[StoredTrial], settings: &JobSettings) -> HashSet<TrialKey> {
+pub fn lost_for_good(stored: &[StoredTrial], settings: &JobSettings) -> HashSet<TrialKey> {
     let Some(max_lost) = settings.ask.servers().into_iter().map(|server| server.sending.paid_retries).max() else {
         return HashSet::new();
     };
@@ -16,7 +16,7 @@ pub(crate) fn lost_for_good(stored: &[StoredTrial], settings: &JobSettings) -> H
 }
 
 /// Keys of the trials whose reply was truncated at a lower limit than the current one of their model.
-pub(crate) fn truncated(stored: &[StoredTrial], models: &[ModelUnderTest]) -> HashSet<TrialKey> {
+pub fn truncated(stored: &[StoredTrial], models: &[ModelUnderTest]) -> HashSet<TrialKey> {
     let limits: HashMap<&str, (u32, u32)> =
         models.iter().filter_map(|model| Some((&*model.name, model.model.token_limits()?))).collect();
     stored
@@ -29,6 +29,6 @@ pub(crate) fn truncated(stored: &[StoredTrial], models: &[ModelUnderTest]) -> Ha
 }
 
 /// Keys of the trials that have a reply.
-pub(crate) fn answered(stored: &[StoredTrial]) -> HashSet<TrialKey> {
+pub fn answered(stored: &[StoredTrial]) -> HashSet<TrialKey> {
     stored.iter().filter(|record| !record.failed()).map(|record| record.key).collect()
 }

@@ -4,25 +4,25 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::error::Result;
-use crate::report::charts::chart::Figure;
-use crate::report::charts::figures::{DisplayNames, figure_specs};
-use crate::report::charts::paper::figure;
-use crate::report::charts::views;
-use crate::report::content::{Measure, PageParts, Report};
-use crate::report::finding_groups::FindingGroups;
-use crate::report::json::{JsonRows, RunsHead, SummaryRuns, document};
-use crate::report::page::{PageHead, PageInputs, items_note, packed_items};
-use crate::report::sentences::{Sentence, how_to_read, sentences};
-use crate::report::short::{facts, short_table, who_is_judged};
-use crate::report::tables::{
+use crate::charts::chart::Figure;
+use crate::charts::figures::{DisplayNames, figure_specs};
+use crate::charts::paper::figure;
+use crate::charts::views;
+use crate::content::{Measure, PageParts, Report};
+use crate::finding_groups::FindingGroups;
+use crate::json::{JsonRows, RunsHead, SummaryRuns, document};
+use crate::page::{PageHead, PageInputs, items_note, packed_items};
+use crate::sentences::{Sentence, how_to_read, sentences};
+use crate::short::{facts, short_table, who_is_judged};
+use crate::tables::{
     BASELINE, LEVELS, SECTIONS, enhancer_effects, observer_notes, strict_groups, summary_rows, tables, with_training,
 };
-use crate::report::text::alert::{Alert, AlertKind};
-use crate::report::text::table::Table;
-use crate::report::text::words::ProfileNames;
-use crate::runs::outcome::ReportLength;
-use crate::types::UnreadReason;
+use crate::text::alert::{Alert, AlertKind};
+use crate::text::table::Table;
+use crate::text::words::ProfileNames;
+use darkqa_base::error::Result;
+use darkqa_base::types::UnreadReason;
+use darkqa_runs::outcome::ReportLength;
 use darkqa_score::comparisons::PooledFinding;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::models_under_test;

@@ -1,22 +1,22 @@
 //! The content of a report, whatever it measures: [`Report`], its [`Measure`], and the parts of its page that depend on
 //! the measure ([`PageParts`]).
 
-use crate::error::Result;
-use crate::report::charts::chart::Figure;
-use crate::report::json::SummaryRuns;
-use crate::report::page::{PageHead, PageInputs};
-use crate::report::sentences::Sentence;
-use crate::report::tables::{EnhancerRow, Section, enhancers};
-use crate::report::text::alert::Alert;
-use crate::report::text::table::Table;
-use crate::report::text::words::ProfileNames;
-use crate::runs::outcome::ReportLength;
+use crate::charts::chart::Figure;
+use crate::json::SummaryRuns;
+use crate::page::{PageHead, PageInputs};
+use crate::sentences::Sentence;
+use crate::tables::{EnhancerRow, Section, enhancers};
+use crate::text::alert::Alert;
+use crate::text::table::Table;
+use crate::text::words::ProfileNames;
+use darkqa_base::error::Result;
+use darkqa_runs::outcome::ReportLength;
 use darkqa_score::comparisons::PooledFinding;
 use darkqa_score::findings::Findings;
 
 /// What a report measures: accuracy, agreement of each model with its own answers at L0, or marks of a judge. All else
 /// in a report is the same for each measure.
-pub(crate) trait Measure {
+pub trait Measure {
     /// Figures of the page.
     fn figures(&self) -> Result<Vec<Figure>>;
 
@@ -63,59 +63,60 @@ pub(crate) trait Measure {
 
 /// Results of one or more runs as sentences and tables.
 pub struct Report<'a> {
-    pub(crate) measure: Box<dyn Measure + 'a>,
+    pub measure: Box<dyn Measure + 'a>,
     /// Numbers of models, questions and replies, one fact each.
-    pub(crate) facts: Vec<String>,
+    pub facts: Vec<String>,
     /// Warnings and notes at the top of the report.
     pub alerts: Vec<Alert>,
     /// Findings as sentences.
-    pub(crate) sentences: Vec<Sentence>,
+    pub sentences: Vec<Sentence>,
     /// Remark below the findings.
-    pub(crate) how_to_read: String,
+    pub how_to_read: String,
     /// All tables; the first is the summary.
     pub tables: Vec<Table>,
 }
 
 impl Report<'_> {
     /// Adds the tables of enhancer use.
-    pub(crate) fn with_enhancers(mut self, rows: &[EnhancerRow]) -> Self {
+    #[must_use]
+    pub fn with_enhancers(mut self, rows: &[EnhancerRow]) -> Self {
         let table = enhancers(rows, &self.measure.enhancer_effects());
         self.tables.extend(table);
         self
     }
 
     /// The line with the numbers of models, questions and replies.
-    pub(crate) fn head(&self) -> String {
+    pub fn head(&self) -> String {
         self.facts.join(" · ")
     }
 }
 
 /// The parts of a page that depend on what its report measures.
-pub(crate) struct PageParts<'a> {
+pub struct PageParts<'a> {
     /// CSS class of the body; pages without true answers have one.
-    pub(crate) class: &'static str,
+    pub class: &'static str,
     /// Title of the document.
-    pub(crate) title: String,
+    pub title: String,
     /// Heading at the top.
-    pub(crate) heading: String,
+    pub heading: String,
     /// First screen; `None` for a page without one.
-    pub(crate) head: Option<PageHead>,
+    pub head: Option<PageHead>,
     /// Noun for families of questions.
-    pub(crate) family: &'static str,
+    pub family: &'static str,
     /// Lines at the top about all numbers.
-    pub(crate) intro: Vec<String>,
+    pub intro: Vec<String>,
     /// Lines below the introduction about the items.
-    pub(crate) notes: Vec<String>,
-    pub(crate) sections: &'a [Section],
+    pub notes: Vec<String>,
+    pub sections: &'a [Section],
     /// Heading of the confusion matrix.
-    pub(crate) answers_title: &'static str,
+    pub answers_title: &'static str,
     /// Items and the replies to them as compressed JSON in base64.
-    pub(crate) items: String,
+    pub items: String,
 }
 
 impl<'a> PageParts<'a> {
     /// An empty page with the heading `WHO in the dark`, the number of runs if there are several, and sections.
-    pub(crate) fn in_the_dark(who: &str, sections: &'a [Section], inputs: &PageInputs<'_>) -> Self {
+    pub fn in_the_dark(who: &str, sections: &'a [Section], inputs: &PageInputs<'_>) -> Self {
         let (title, heading) = match &*inputs.runs {
             [one] => (format!("{who} in the dark · {}", one.name), format!("{who} in the dark")),
             several => {

@@ -3,8 +3,8 @@
 
 use std::fmt::{self, Write as _};
 
-use crate::report::sentences::{Sentence, capitalised};
-use crate::report::text::words::{percent, points, share_ends};
+use crate::sentences::{Sentence, capitalised};
+use crate::text::words::{percent, points, share_ends};
 
 /// Title of a group, and the kinds of sentences that belong to it.
 struct GroupKinds {
@@ -60,7 +60,7 @@ const MAX_ENHANCERS: usize = 3;
 const MAX_CLAUSES: usize = 3;
 
 /// Findings of a report in groups, without empty groups.
-pub(crate) struct FindingGroups<'a>(Vec<FindingGroup<'a>>);
+pub struct FindingGroups<'a>(Vec<FindingGroup<'a>>);
 
 /// Findings of one group, the most important kind first.
 pub(crate) struct FindingGroup<'a> {

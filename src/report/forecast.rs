@@ -3,25 +3,25 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use crate::error::{Error, Result};
-use crate::report::text::table::ColumnKind::{Count, Text};
-use crate::report::text::table::TableBuilder;
-use crate::report::text::terminal;
-use crate::runs::forecast::{CostLine, Forecast, StoreForecast};
-use crate::types::ProfileName;
-use crate::types::text::{bytes, counted, hours, money};
+use crate::text::table::ColumnKind::{Count, Text};
+use crate::text::table::TableBuilder;
+use crate::text::terminal;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::ProfileName;
+use darkqa_base::types::text::{bytes, counted, hours, money};
+use darkqa_runs::forecast::{CostLine, Forecast, StoreForecast};
 
 /// Relative difference of charges from the price table from which it is printed; chosen.
 const TOLD_FROM: f64 = 0.05;
 
 /// Serializes the forecast as JSON.
-pub(crate) fn forecast_json(forecast: &Forecast) -> Result<String> {
+pub fn forecast_json(forecast: &Forecast) -> Result<String> {
     serde_json::to_string_pretty(forecast).map(|text| text + "\n").map_err(|e| Error::data("the estimate", e))
 }
 
 /// Formats the forecast for the terminal.
 #[must_use]
-pub(crate) fn render(forecast: &Forecast) -> String {
+pub fn render(forecast: &Forecast) -> String {
     let table = TableBuilder::new("estimate", &forecast.lines)
         .column(Text, "terminal model", |line| line.model.clone())
         .column(Count, "terminal requests", |line| count(line.requests as f64))
@@ -186,7 +186,7 @@ fn range_text(low: Option<f64>, high: Option<f64>, format: fn(f64) -> String) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::runs::forecast::ProfileCost;
+    use darkqa_runs::forecast::ProfileCost;
 
     fn cost(reading: Option<&str>, requests: usize, dollars: Option<f64>) -> ProfileCost {
         ProfileCost { reading: reading.map(|name| ProfileName::new(name).unwrap()), requests, dollars }

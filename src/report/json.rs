@@ -5,10 +5,10 @@ use std::path::Path;
 
 use serde::{Serialize, Serializer};
 
-use crate::error::{Error, Result};
-use crate::report::text::table::{Table, TableRow, fields};
-use crate::runs::outcome::ReportLength;
-use crate::types::manifests::RunManifest;
+use crate::text::table::{Table, TableRow, fields};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_runs::outcome::ReportLength;
 
 /// JSON document of a head and table rows; each row is an object with the column names as keys.
 #[derive(Serialize)]
@@ -99,7 +99,7 @@ struct ComparedRun<'a> {
 
 /// Runs that a summary describes.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum SummaryRuns<'a> {
+pub enum SummaryRuns<'a> {
     /// One run, with its folder if the summary is stored elsewhere.
     One(&'a RunManifest, Option<&'a Path>),
     /// Several runs, each with its folder.
@@ -128,8 +128,8 @@ impl<'a> SummaryRuns<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::text::table::ColumnKind::Count;
-    use crate::report::text::table::TableBuilder;
+    use crate::text::table::ColumnKind::Count;
+    use crate::text::table::TableBuilder;
 
     #[test]
     fn tables_without_csv_columns_have_no_rows() {

@@ -3,17 +3,17 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use crate::report::content::Report;
-use crate::report::finding_groups::FindingGroups;
-use crate::report::text::table::{Column, ColumnKind, Table, TableFormat};
-use crate::report::text::terminal::readable;
-use crate::report::text::words::{ends, interval, words};
-use crate::runs::outcome::ReportLength;
-use crate::runs::stored::run_name;
-use crate::types::text::counted;
+use crate::content::Report;
+use crate::finding_groups::FindingGroups;
+use crate::text::table::{Column, ColumnKind, Table, TableFormat};
+use crate::text::terminal::readable;
+use crate::text::words::{ends, interval, words};
+use darkqa_base::types::text::counted;
+use darkqa_runs::outcome::ReportLength;
+use darkqa_runs::stored::run_name;
 
 /// Writes a report as Markdown. `folders` are those of its runs.
-pub(crate) fn markdown(report: &Report<'_>, folders: &[&Path], length: ReportLength) -> String {
+pub fn markdown(report: &Report<'_>, folders: &[&Path], length: ReportLength) -> String {
     let names: Vec<String> = folders.iter().map(|folder| inline(&run_name(folder))).collect();
     let mut text = format!("### Seeing in the dark: {}\n\n", names.join(", "));
     let _ = writeln!(text, "{}\n", block(&report.head()));
@@ -118,7 +118,7 @@ fn row(cells: impl Iterator<Item = String>) -> String {
 }
 
 /// Escapes a text for use within a line or a table cell: without markup, HTML, links, mentions of users or line breaks.
-pub(crate) fn inline(text: &str) -> String {
+pub fn inline(text: &str) -> String {
     let line = readable(&text.replace(['\n', '\r', '\t'], " "));
     let mut escaped = String::with_capacity(line.len());
     let mut before = None;
@@ -154,8 +154,8 @@ fn block(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::text::table::ColumnKind::{Accuracy, Text};
-    use crate::report::text::table::TableBuilder;
+    use crate::text::table::ColumnKind::{Accuracy, Text};
+    use crate::text::table::TableBuilder;
     use darkqa_score::estimate::Estimate;
 
     #[test]

@@ -4,24 +4,24 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use crate::error::Result;
-use crate::files::write_with;
-use crate::report::charts::chart;
-use crate::report::charts::samples::{self, samples_of};
-use crate::report::content::Report;
-use crate::report::finding_groups::FindingGroups;
-use crate::report::json::SummaryRuns;
-use crate::report::markdown::markdown;
-use crate::report::page::{PageInputs, page};
-use crate::report::short::head_and_findings;
-use crate::report::tables::{FLIPS, write_flips};
-use crate::report::text::latex;
-use crate::report::text::table;
-use crate::report::text::terminal::{render, wrapped};
-use crate::runs::outcome::{ReportLength, StdoutFormat, Syntax};
+use crate::charts::chart;
+use crate::charts::samples::{self, samples_of};
+use crate::content::Report;
+use crate::finding_groups::FindingGroups;
+use crate::json::SummaryRuns;
+use crate::markdown::markdown;
+use crate::page::{PageInputs, page};
+use crate::short::head_and_findings;
+use crate::tables::{FLIPS, write_flips};
+use crate::text::latex;
+use crate::text::table;
+use crate::text::terminal::{render, wrapped};
+use darkqa_base::error::Result;
+use darkqa_base::files::write_with;
+use darkqa_runs::outcome::{ReportLength, StdoutFormat, Syntax};
 
 /// File name of the HTML page.
-pub(crate) const PAGE: &str = "report.html";
+pub const PAGE: &str = "report.html";
 
 /// Name of the file with the summary.
 const SUMMARY_JSON: &str = "summary.json";
@@ -30,7 +30,7 @@ const SUMMARY_JSON: &str = "summary.json";
 ///
 /// # Errors
 /// If a figure or the page cannot be made.
-pub(crate) fn html_page(report: &Report<'_>, inputs: &PageInputs<'_>) -> Result<String> {
+pub fn html_page(report: &Report<'_>, inputs: &PageInputs<'_>) -> Result<String> {
     page(report, &report.measure.figures()?, inputs)
 }
 
@@ -59,11 +59,7 @@ pub fn products(report: &Report<'_>, inputs: &PageInputs<'_>) -> Result<Vec<(Str
 ///
 /// # Errors
 /// If a file cannot be made.
-pub(crate) fn files(
-    report: &Report<'_>,
-    runs: SummaryRuns<'_>,
-    inputs: &PageInputs<'_>,
-) -> Result<Vec<(String, Vec<u8>)>> {
+pub fn files(report: &Report<'_>, runs: SummaryRuns<'_>, inputs: &PageInputs<'_>) -> Result<Vec<(String, Vec<u8>)>> {
     let mut files = products(report, inputs)?;
     let summary = report.measure.json(report, runs, ReportLength::Summary)?;
     files.push((SUMMARY_JSON.to_owned(), summary.into_bytes()));
@@ -74,7 +70,7 @@ pub(crate) fn files(
 ///
 /// # Errors
 /// If the rows cannot be written.
-pub(crate) fn first_failures(report: &Report<'_>) -> Result<Option<(String, Vec<u8>)>> {
+pub fn first_failures(report: &Report<'_>) -> Result<Option<(String, Vec<u8>)>> {
     let Some(findings) = report.measure.first_failures() else {
         return Ok(None);
     };
@@ -87,7 +83,7 @@ pub(crate) fn first_failures(report: &Report<'_>) -> Result<Option<(String, Vec<
 ///
 /// # Errors
 /// If the file cannot be written.
-pub(crate) fn write_first_failures(report: &Report<'_>, folder: &Path) -> Result<Option<&'static str>> {
+pub fn write_first_failures(report: &Report<'_>, folder: &Path) -> Result<Option<&'static str>> {
     let Some(findings) = report.measure.first_failures() else {
         return Ok(None);
     };
@@ -99,12 +95,7 @@ pub(crate) fn write_first_failures(report: &Report<'_>, folder: &Path) -> Result
 ///
 /// # Errors
 /// If the summary cannot be serialized.
-pub(crate) fn printed(
-    report: &Report<'_>,
-    runs: SummaryRuns<'_>,
-    folders: &[&Path],
-    show: StdoutFormat,
-) -> Result<String> {
+pub fn printed(report: &Report<'_>, runs: SummaryRuns<'_>, folders: &[&Path], show: StdoutFormat) -> Result<String> {
     match show.syntax {
         Syntax::Text => Ok(text(report, folders, show.length)),
         Syntax::Markdown => Ok(markdown(report, folders, show.length)),

@@ -15,17 +15,17 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::template::allow_script;
-use crate::error::{Error, Result};
-use crate::report::charts::chart::Panel;
-use crate::report::charts::paper::count_figure;
-use crate::report::text::table as files;
-use crate::report::text::table::ColumnKind::{Count, Text};
-use crate::report::text::table::TableBuilder;
-use crate::report::text::terminal::{self, to_script_json};
-use crate::report::text::words::with_interval;
-use crate::types::questions::FAMILIES;
-use crate::types::text::counted;
-use crate::types::{Digest, Evidence, Family};
+use crate::charts::chart::Panel;
+use crate::charts::paper::count_figure;
+use crate::text::table as files;
+use crate::text::table::ColumnKind::{Count, Text};
+use crate::text::table::TableBuilder;
+use crate::text::terminal::{self, to_script_json};
+use crate::text::words::with_interval;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::questions::FAMILIES;
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{Digest, Evidence, Family};
 use darkqa_questions::GeneratedQuestion;
 use darkqa_questions::appearance::{FrameAppearance, MIN_EDGE_GRADIENT};
 use darkqa_questions::colors::{Color, NONE};
@@ -39,7 +39,7 @@ const MAX_REASONS: usize = 3;
 /// Table for the terminal: questions by family, with the scores of answering without images and the number of valid
 /// candidates.
 #[must_use]
-pub(crate) fn table(summary: &QuestionSummary) -> String {
+pub fn table(summary: &QuestionSummary) -> String {
     let families = FAMILIES.iter().filter_map(|row| Some((row.name, Some(summary.candidates.get(&row.family)?))));
     let total = summary.baselines.get(Family::TOTAL);
     let rows = families.chain(total.map(|_| (Family::TOTAL, None)));
@@ -136,11 +136,7 @@ struct SummaryFile<'a> {
 ///
 /// # Errors
 /// If the statistics cannot be serialized.
-pub(crate) fn json(
-    summary: &QuestionSummary,
-    checks: &Checks,
-    against: Option<&AppearanceComparison>,
-) -> Result<String> {
+pub fn json(summary: &QuestionSummary, checks: &Checks, against: Option<&AppearanceComparison>) -> Result<String> {
     let file = SummaryFile { summary, checks: (!checks.is_empty()).then(|| checks_json(checks)), against };
     serde_json::to_string_pretty(&file).map(|text| text + "\n").map_err(|e| Error::data("statistics", e))
 }
@@ -149,7 +145,7 @@ pub(crate) fn json(
 ///
 /// # Errors
 /// If the statistics cannot be written.
-pub(crate) fn csv(summary: &QuestionSummary) -> Result<Vec<u8>> {
+pub fn csv(summary: &QuestionSummary) -> Result<Vec<u8>> {
     let mut rows: Vec<[String; 4]> = Vec::new();
     let mut row = |table: &str, row: &dyn Display, column: &str, count: &dyn Display| {
         rows.push([table, &row.to_string(), column, &count.to_string()].map(str::to_owned));
@@ -225,7 +221,7 @@ pub(crate) fn csv(summary: &QuestionSummary) -> Result<Vec<u8>> {
 
 /// Measures of appearance of two sets of frames.
 #[derive(Debug, Serialize)]
-pub(crate) struct AppearanceComparison {
+pub struct AppearanceComparison {
     /// Name and number of frames of each set.
     sets: [(String, usize); 2],
     rows: Vec<MeasureRow>,
@@ -288,7 +284,7 @@ fn quartiles(mut numbers: Vec<f64>) -> Option<[f64; 3]> {
 impl AppearanceComparison {
     /// Compares two sets of frames, each with its name.
     #[must_use]
-    pub(crate) fn new(sets: [(&str, &[FrameAppearance]); 2]) -> Self {
+    pub fn new(sets: [(&str, &[FrameAppearance]); 2]) -> Self {
         let looks = sets.map(|(_, looks)| looks);
         let mut rows = vec![
             MeasureRow::new(looks, "mean linear light, EV of white", 2, |look| Some(look.light_ev)),
@@ -307,7 +303,7 @@ impl AppearanceComparison {
 
     /// Formats the table for the terminal.
     #[must_use]
-    pub(crate) fn table(&self) -> String {
+    pub fn table(&self) -> String {
         let [first, other] = [0, 1].map(|set| {
             let (name, frames) = &self.sets[set];
             format!("terminal {name} ({frames})").replace(", ", " ")
@@ -328,7 +324,7 @@ impl AppearanceComparison {
 /// Table of wrong and ambiguous questions by person and family, with a line on the agreement of each two people; empty
 /// without checks.
 #[must_use]
-pub(crate) fn text(checks: &Checks) -> String {
+pub fn text(checks: &Checks) -> String {
     if checks.is_empty() {
         return String::new();
     }
@@ -403,7 +399,7 @@ fn checks_json(checks: &Checks) -> Value {
 ///
 /// # Errors
 /// If the figure cannot be drawn.
-pub(crate) fn figure(summary: &QuestionSummary) -> Result<String> {
+pub fn figure(summary: &QuestionSummary) -> Result<String> {
     let questions = summary.candidates.iter().map(|(family, candidates)| (family.to_string(), candidates.asked));
     let rooms = summary.rooms.iter().map(|(room, counts)| (room.clone(), counts.frames as u64));
     let mut panels =
@@ -438,7 +434,7 @@ const PLACEHOLDER: &str = "/*QUESTIONS*/null";
 
 /// Question on the page.
 #[derive(Debug, Serialize)]
-pub(crate) struct ReviewItem<'a> {
+pub struct ReviewItem<'a> {
     id: &'a str,
     frame: &'a str,
     family: &'a str,
@@ -455,7 +451,7 @@ pub(crate) struct ReviewItem<'a> {
 impl<'a> ReviewItem<'a> {
     /// Item for a question about the image at path `image`, whose `size` is width and height in pixels.
     #[must_use]
-    pub(crate) fn new(generated: &'a GeneratedQuestion, image: String, size: [usize; 2]) -> Self {
+    pub fn new(generated: &'a GeneratedQuestion, image: String, size: [usize; 2]) -> Self {
         let question = &generated.question;
         Self {
             id: &question.id.0,
@@ -488,7 +484,7 @@ struct ReviewPage<'a> {
 ///
 /// # Errors
 /// If the questions cannot be serialized.
-pub(crate) fn page(items: &[ReviewItem<'_>]) -> Result<String> {
+pub fn page(items: &[ReviewItem<'_>]) -> Result<String> {
     let set = Digest::from_parts(items.iter().map(|item| item.id.as_bytes()));
     let page = PAGE.replacen(PLACEHOLDER, &to_script_json(&ReviewPage { set, items })?, 1);
     Ok(allow_script(&page))
@@ -499,7 +495,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::types::{Choices, Family, FrameId, Question, QuestionId};
+    use darkqa_base::types::{Choices, Family, FrameId, Question, QuestionId};
 
     fn look(light_ev: f64, segments: Option<usize>) -> FrameAppearance {
         FrameAppearance { light_ev, edges: 0.25, colors: [0.0; 12], segments, depth: None }

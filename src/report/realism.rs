@@ -8,16 +8,16 @@
 
 use serde::Serialize;
 
-use crate::error::{Error, Result};
-use crate::report::charts::chart::{LineContent, LineStyle, Panel, PlotLine, Scale};
-use crate::report::charts::paper::point_figure;
-use crate::report::charts::sheet;
-use crate::report::charts::sheet::CropRow;
-use crate::report::text::table::ColumnKind::{Count, Number, Text};
-use crate::report::text::table::{TableBuilder, csv};
-use crate::report::text::terminal;
-use crate::types::Rgb;
-use crate::types::text::counted;
+use crate::charts::chart::{LineContent, LineStyle, Panel, PlotLine, Scale};
+use crate::charts::paper::point_figure;
+use crate::charts::sheet;
+use crate::charts::sheet::CropRow;
+use crate::text::table::ColumnKind::{Count, Number, Text};
+use crate::text::table::{TableBuilder, csv};
+use crate::text::terminal;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Rgb;
+use darkqa_base::types::text::counted;
 use darkqa_score::photographs::realism::gain::{FitOutcome, PairFit, PooledGain, ProfileFit};
 use darkqa_score::photographs::realism::residual::{Bins, EmptyBins, Residuals};
 use darkqa_score::photographs::realism::smooth::{MIN_VALUES, Mean};
@@ -25,7 +25,7 @@ use darkqa_score::photographs::realism::{CameraOrigin, ImageComparison, NoiseCom
 
 /// Summary over all pairs.
 #[derive(Debug, Serialize)]
-pub(crate) struct RealismSummary {
+pub struct RealismSummary {
     pairs: usize,
     #[serde(flatten)]
     source: ComparedData,
@@ -47,7 +47,7 @@ pub(crate) struct RealismSummary {
 
 /// Histogram rules for the comparison of residuals.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct ResidualRules {
+pub struct ResidualRules {
     /// Bins of the histograms.
     pub bins: Bins,
     /// Rule for empty bins.
@@ -66,7 +66,7 @@ impl ResidualRules {
 
 /// Data and settings of a comparison.
 #[derive(Debug, Clone, Serialize)]
-pub(crate) struct ComparedData {
+pub struct ComparedData {
     /// Seed of the noise.
     pub seed: u64,
     /// Settings of the synthesis, by noise profile.
@@ -79,7 +79,7 @@ pub(crate) struct ComparedData {
 
 /// Names of the pairs that were not compared, by reason.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
-pub(crate) struct LeftOut {
+pub struct LeftOut {
     /// Pairs whose images could not be decoded or compared.
     pub failed: Vec<String>,
     /// Pairs whose low-light image is brighter than the other image.
@@ -91,7 +91,7 @@ pub(crate) struct LeftOut {
 impl LeftOut {
     /// True if every pair was compared.
     #[must_use]
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 
@@ -130,7 +130,7 @@ impl RealismSummary {
     ///
     /// # Errors
     /// If no pair was compared.
-    pub(crate) fn new(
+    pub fn new(
         rules: ResidualRules,
         source: ComparedData,
         pairs: &[&PairComparison],
@@ -156,13 +156,13 @@ impl RealismSummary {
 
     /// Serializes the summary as JSON.
     #[must_use]
-    pub(crate) fn json(&self) -> String {
+    pub fn json(&self) -> String {
         format!("{:#}\n", serde_json::json!(self))
     }
 
     /// Formats the paper's table with intervals, the differences from exposure drop alone, the fitted gains, and notes.
     #[must_use]
-    pub(crate) fn table(&self) -> String {
+    pub fn table(&self) -> String {
         let mut text = format!(
             "Synthetic against real low light, {}: mean ± half of the 95 % interval (Student's t, from {MIN_VALUES} pairs on)\n{}{}",
             counted(self.pairs, "pair"),
@@ -265,7 +265,7 @@ impl PairRow<'_> {
 }
 
 /// CSV file with a row for each pair and each way to synthesize its image.
-pub(crate) fn pairs(pairs: &[&PairComparison]) -> Result<Vec<u8>> {
+pub fn pairs(pairs: &[&PairComparison]) -> Result<Vec<u8>> {
     let rows = pairs
         .iter()
         .flat_map(|pair| std::iter::once(None).chain(pair.noise.iter().map(Some)).map(|noise| PairRow { pair, noise }));
@@ -296,13 +296,13 @@ pub(crate) fn pairs(pairs: &[&PairComparison]) -> Result<Vec<u8>> {
 }
 
 /// Residuals of all pairs together: of the real images, and of each noise method.
-pub(crate) struct PooledResiduals {
+pub struct PooledResiduals {
     pub real: Residuals,
     pub noise: Vec<(NoiseMethod, Residuals)>,
 }
 
 /// CSV file with the mean and standard deviation of real and synthetic residuals by clean code.
-pub(crate) fn by_code(residuals: &PooledResiduals) -> Result<Vec<u8>> {
+pub fn by_code(residuals: &PooledResiduals) -> Result<Vec<u8>> {
     let rows = residuals.noise.iter().flat_map(|(method, noise)| {
         residuals.real.by_code().zip(noise.by_code()).map(move |(real, noise)| (method, real, noise))
     });
@@ -320,7 +320,7 @@ pub(crate) fn by_code(residuals: &PooledResiduals) -> Result<Vec<u8>> {
 }
 
 /// Figure with histograms of real and synthetic residuals in 8-bit codes.
-pub(crate) fn figure(residuals: &PooledResiduals) -> Result<String> {
+pub fn figure(residuals: &PooledResiduals) -> Result<String> {
     let mut lines = histogram("real", LineStyle::BLACK, residuals.real.shares());
     for (style, (method, noise)) in residuals.noise.iter().enumerate() {
         lines.extend(histogram(&format!("synthetic, {method}"), LineStyle(style), noise.shares()));
@@ -354,7 +354,7 @@ fn histogram(name: &str, style: LineStyle, shares: impl Iterator<Item = (i32, f6
 /// Sheet of crops from each pair, brightened by its exposure drop: real image, exposure drop alone, and each noise
 /// method.
 #[must_use]
-pub(crate) fn crops<'a>(pairs: impl Iterator<Item = (&'a PairComparison, &'a [Rgb])>) -> Rgb {
+pub fn crops<'a>(pairs: impl Iterator<Item = (&'a PairComparison, &'a [Rgb])>) -> Rgb {
     let pairs: Vec<_> = pairs.collect();
     let rows: Vec<CropRow<'_>> = pairs
         .iter()
@@ -377,7 +377,7 @@ pub(crate) fn crops<'a>(pairs: impl Iterator<Item = (&'a PairComparison, &'a [Rg
 }
 
 /// Remark on the gain of a saved image, printed with every gain.
-pub(crate) const AS_SAVED: &str = "as saved; a smaller K than the sensor's means that noise was averaged away";
+pub const AS_SAVED: &str = "as saved; a smaller K than the sensor's means that noise was averaged away";
 
 /// Table of the gains over pairs, with a row for each noise profile.
 fn table(fits: &[ProfileFit]) -> String {
@@ -438,7 +438,7 @@ fn number(value: f64) -> String {
 }
 
 /// CSV file with a row for each pair and each noise profile.
-pub(crate) fn fits_csv(fits: &[ProfileFit]) -> Result<Vec<u8>> {
+pub fn fits_csv(fits: &[ProfileFit]) -> Result<Vec<u8>> {
     let rows = fits.iter().flat_map(|fit| fit.pairs.iter().map(move |pair| (fit, pair)));
     let table = TableBuilder::new("fits", rows)
         .column(Text, "csv pair", |(_, pair)| pair.pair.clone())

@@ -22,15 +22,15 @@ use clap::builder::styling::{AnsiColor, Style};
 use super::finding_groups::GroupedFinding;
 use super::sentences::{EffectDirection, Sentence};
 use super::tables::{control_text, unread_note};
-use crate::report::finding_groups::FindingGroups;
-use crate::report::text::alert::{Alert, lines};
-use crate::report::text::ladder::{Ladder, SeriesByLevel};
-use crate::report::text::terminal::{WIDTH, line, wrapped};
-use crate::report::text::words::{frames, percent, shorten_middle, widest_reach_of, with_interval};
-use crate::runs::outcome::ReportLength;
-use crate::types::replies::OBSERVER;
-use crate::types::text::{counted, escape_hidden, plural};
-use crate::types::{Axis, AxisLevel};
+use crate::finding_groups::FindingGroups;
+use crate::text::alert::{Alert, lines};
+use crate::text::ladder::{Ladder, SeriesByLevel};
+use crate::text::terminal::{WIDTH, line, wrapped};
+use crate::text::words::{frames, percent, shorten_middle, widest_reach_of, with_interval};
+use darkqa_base::types::replies::OBSERVER;
+use darkqa_base::types::text::{counted, escape_hidden, plural};
+use darkqa_base::types::{Axis, AxisLevel};
+use darkqa_runs::outcome::ReportLength;
 use darkqa_score::accuracies::{AccuracyCell, Health};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::findings::Findings;
@@ -235,7 +235,7 @@ fn accuracy_text(findings: &Findings<'_>, cell: Option<&AccuracyCell>) -> String
 const GROUP_WIDTH: usize = 15;
 
 /// Head, alerts and summary, then the main finding of each group, or all findings with a note on how to read them.
-pub(crate) fn head_and_findings(
+pub fn head_and_findings(
     head: &[String],
     alerts: &[Alert],
     groups: &FindingGroups<'_>,

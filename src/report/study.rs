@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use super::template::allow_script;
-use crate::error::Result;
-use crate::report::text::terminal::to_script_json;
-use crate::types::Digest;
+use crate::text::terminal::to_script_json;
+use darkqa_base::error::Result;
+use darkqa_base::types::Digest;
 
 /// Template of the page.
 const PAGE: &str = include_str!("study.html");
@@ -15,7 +15,7 @@ const PLACEHOLDER: &str = "/*STUDY*/null";
 
 /// Question on the page, without its true choice.
 #[derive(Debug, Clone, Serialize)]
-pub(crate) struct StudyQuestion {
+pub struct StudyQuestion {
     pub id: String,
     /// Number of the frame or walk.
     pub frame: usize,
@@ -29,7 +29,7 @@ pub(crate) struct StudyQuestion {
 
 /// Images of a frame or walk in one condition.
 #[derive(Debug, Clone, Serialize)]
-pub(crate) struct StudyImage {
+pub struct StudyImage {
     /// Name of the condition. The page writes it to the file of answers, but does not show it.
     pub condition: String,
     /// Paths of the images relative to the page: one for a frame, all for a walk.
@@ -52,7 +52,7 @@ struct StudyPage<'a> {
 ///
 /// # Errors
 /// If the questions cannot be serialized.
-pub(crate) fn page(items: &[StudyQuestion]) -> Result<String> {
+pub fn page(items: &[StudyQuestion]) -> Result<String> {
     let set = Digest::from_parts(items.iter().flat_map(|item| {
         let images = item.shots.iter().flat_map(|shot| &shot.images).map(String::as_bytes);
         std::iter::once(item.id.as_bytes()).chain(images)

@@ -9,8 +9,8 @@ use minijinja::{AutoEscape, Environment};
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
-use crate::error::{Error, Result};
-use crate::types::text::escape_hidden;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::text::escape_hidden;
 
 /// Parts that several pages share: placeholder in a template, and its text.
 const PARTS: [(&str, &str); 3] = [
@@ -24,7 +24,7 @@ const PARTS: [(&str, &str); 3] = [
 ///
 /// # Errors
 /// If the template cannot be rendered.
-pub(crate) fn render(template: &str, values: impl Serialize) -> Result<String> {
+pub fn render(template: &str, values: impl Serialize) -> Result<String> {
     let whole = PARTS.iter().fold(template.to_owned(), |text, (placeholder, part)| text.replace(placeholder, part));
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);

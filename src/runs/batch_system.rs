@@ -13,11 +13,11 @@ use std::sync::mpsc;
 use std::time::Duration;
 use std::{fmt, thread};
 
-use crate::error::{Error, Result};
+use darkqa_base::error::{Error, Result};
 
 /// The batch system that started this process, with the place of the process in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum BatchSystem {
+pub enum BatchSystem {
     /// A task of a job array.
     Slurm(ArrayTask),
     /// A pod of an indexed job: its index, from 0. No variable has the number of pods.
@@ -29,7 +29,7 @@ impl BatchSystem {
     ///
     /// # Errors
     /// If a variable is not a number.
-    pub(crate) fn from_environment(variable: &impl Fn(&str) -> Option<String>) -> Result<Option<Self>> {
+    pub fn from_environment(variable: &impl Fn(&str) -> Option<String>) -> Result<Option<Self>> {
         if let Some(task) = ArrayTask::from_environment(variable)? {
             return Ok(Some(Self::Slurm(task)));
         }
@@ -40,7 +40,7 @@ impl BatchSystem {
 
 /// Evenly spaced numbers of the tasks of an array, as in `sbatch --array=0-6:2`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct TaskRange {
+pub struct TaskRange {
     first: u32,
     last: u32,
     step: NonZeroU32,
@@ -86,7 +86,7 @@ impl FromStr for TaskRange {
 /// A task of a Slurm array, as the environment describes it. A job that a task submits inherits the variables of the
 /// task: see [`membership`](Self::membership).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct ArrayTask {
+pub struct ArrayTask {
     /// Number of the task.
     pub(super) number: u32,
     /// Lowest and highest number of the submitted array. Slurm states step 1 for a list such as `0,1,3`.

@@ -4,8 +4,8 @@
 
 use serde::Serialize;
 
-use crate::types::ProfileName;
-use crate::types::text::{bytes, counted};
+use darkqa_base::types::ProfileName;
+use darkqa_base::types::text::{bytes, counted};
 use darkqa_score::cluster::{ClusterUnit, Clusters};
 use darkqa_score::comparisons::paired::POWER;
 use darkqa_score::power::{CHANGED, CORRELATION, Detectable, PlannedSample, TARGET};
@@ -13,7 +13,7 @@ use darkqa_score::tested_sentences::RunContents;
 
 /// Estimate for the remaining requests of one model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct CostLine {
+pub struct CostLine {
     /// Name of the model, with a remark if it is asked without images.
     pub model: String,
     /// Addresses of its endpoints, without secrets.
@@ -45,7 +45,8 @@ pub(crate) struct CostLine {
 
 impl CostLine {
     /// The same line, with costs at this ratio to the price table.
-    pub(crate) fn at_ratio(self, ratio: Option<f64>) -> Self {
+    #[must_use]
+    pub fn at_ratio(self, ratio: Option<f64>) -> Self {
         let times = |dollars: Option<f64>| dollars.map(|dollars| ratio.unwrap_or(1.0) * dollars);
         Self {
             dollars: times(self.dollars),
@@ -63,7 +64,7 @@ impl CostLine {
 
 /// Remaining requests with images of one noise profile.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct ProfileCost {
+pub struct ProfileCost {
     /// Noise profile; `None` for requests that all profiles share: L0, images without noise, and no image at all.
     pub reading: Option<ProfileName>,
     /// Number of requests left.
@@ -74,7 +75,7 @@ pub(crate) struct ProfileCost {
 
 /// Estimate of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Forecast {
+pub struct Forecast {
     /// Requests left, by model.
     pub lines: Vec<CostLine>,
     /// Built-in models, which need no endpoint, and the observer's controls; each with its number of remaining trials.
@@ -125,7 +126,7 @@ pub(crate) struct Forecast {
 
 /// Number of frames or walks that is too small for reliable intervals and tests.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct FewSources {
+pub struct FewSources {
     /// Number in the run.
     pub number: usize,
     /// Number that intervals and tests need.
@@ -136,7 +137,7 @@ pub(crate) struct FewSources {
 
 /// Reuse of stored images by another model that is asked about the same images.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct StoreForecast {
+pub struct StoreForecast {
     /// Text for the kind of images that are stored.
     pub kept: &'static str,
     /// Size of all images in bytes.
@@ -149,13 +150,13 @@ pub(crate) struct StoreForecast {
 
 impl StoreForecast {
     /// Forecast for images of a total size and a store of a capacity, both in bytes.
-    pub(crate) fn new(kept: &'static str, bytes: f64, room: f64) -> Self {
+    pub fn new(kept: &'static str, bytes: f64, room: f64) -> Self {
         let hits = if bytes > room { room / bytes } else { 1.0 };
         Self { kept, bytes, room, hits }
     }
 
     /// Formats the forecast as one line.
-    pub(crate) fn line(&self) -> String {
+    pub fn line(&self) -> String {
         let (kept, set, room) = (self.kept, bytes(self.bytes), bytes(self.room));
         let percent = 100.0 * self.hits;
         format!("image store: {kept} {set}, room {room}: the next model finds about {percent:.0} % of them\n")
@@ -165,7 +166,7 @@ impl StoreForecast {
 /// Smallest difference between two conditions that a run can detect, and the number of clusters needed to detect 5
 /// points.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct PowerForecast {
+pub struct PowerForecast {
     /// Number of questions.
     pub questions: usize,
     pub clusters: usize,
@@ -181,7 +182,7 @@ pub(crate) struct PowerForecast {
 
 impl PowerForecast {
     /// Computes the forecast. `question_clusters` has the cluster index of each question; `None` without questions.
-    pub(crate) fn new(clusters: &Clusters, question_clusters: &[u32], contents: RunContents) -> Option<Self> {
+    pub fn new(clusters: &Clusters, question_clusters: &[u32], contents: RunContents) -> Option<Self> {
         let mut questions = vec![0; clusters.count()];
         for cluster in question_clusters {
             questions[*cluster as usize] += 1;
@@ -203,7 +204,7 @@ impl PowerForecast {
     }
 
     /// Formats the forecast as one line, without a line break.
-    pub(crate) fn line(&self) -> String {
+    pub fn line(&self) -> String {
         let among = if self.unit == ClusterUnit::Question.to_string() {
             counted(self.questions, "question")
         } else {
@@ -234,7 +235,7 @@ impl PowerForecast {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::{FrameId, QuestionId};
+    use darkqa_base::types::{FrameId, QuestionId};
     use darkqa_score::cluster::FrameTies;
 
     #[test]

@@ -2,16 +2,16 @@
 
 use std::collections::HashMap;
 
-use crate::types::{Digest, QuestionId, RunQuestion};
+use darkqa_base::types::{Digest, QuestionId, RunQuestion};
 
 /// Setting in the manifest with the name of the judge.
-pub(crate) const JUDGE: &str = "--judge";
+pub const JUDGE: &str = "--judge";
 /// Setting in the manifest with the protocol of judging.
-pub(crate) const PROTOCOL: &str = "--protocol";
+pub const PROTOCOL: &str = "--protocol";
 
 /// The marks of a judge, by the text of the question and the answer. Questions with the same text share their marks.
 #[derive(Debug)]
-pub(crate) struct MarkIndex<M> {
+pub struct MarkIndex<M> {
     /// Digest of the question's part of the judge's prompt, by question.
     question_digests: HashMap<QuestionId, Digest>,
     /// Marks by the digest of question and answer.
@@ -20,7 +20,7 @@ pub(crate) struct MarkIndex<M> {
 
 impl<M> MarkIndex<M> {
     /// An index without marks.
-    pub(crate) fn new<'a>(questions: impl IntoIterator<Item = &'a RunQuestion>) -> Self {
+    pub fn new<'a>(questions: impl IntoIterator<Item = &'a RunQuestion>) -> Self {
         Self {
             question_digests: questions
                 .into_iter()
@@ -31,14 +31,14 @@ impl<M> MarkIndex<M> {
     }
 
     /// Adds the mark of an answer, replacing an earlier one. Ignores answers to unknown questions.
-    pub(crate) fn add(&mut self, question: &QuestionId, answer: &str, mark: M) {
+    pub fn add(&mut self, question: &QuestionId, answer: &str, mark: M) {
         if let Some(digest) = self.prompt_digest(question, answer) {
             self.by_answer.insert(digest, mark);
         }
     }
 
     /// The mark of an answer to a question.
-    pub(crate) fn get(&self, question: &QuestionId, answer: &str) -> Option<&M> {
+    pub fn get(&self, question: &QuestionId, answer: &str) -> Option<&M> {
         self.by_answer.get(&self.prompt_digest(question, answer)?)
     }
 

@@ -11,14 +11,14 @@ use clap::Args;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::types::Decides;
-use crate::types::flags::{milliseconds, positive};
-use crate::types::manifests::{RunManifest, Status};
-use crate::types::text::money;
+use darkqa_base::types::Decides;
+use darkqa_base::types::flags::{milliseconds, positive};
+use darkqa_base::types::manifests::{RunManifest, Status};
+use darkqa_base::types::text::money;
 
 /// The result of a command.
 #[derive(Debug)]
-pub(crate) struct Outcome {
+pub struct Outcome {
     /// Determines the exit code.
     pub status: Status,
     /// Text for standard output.
@@ -30,23 +30,24 @@ pub(crate) struct Outcome {
 
 impl Outcome {
     /// `Complete` if all work of the command succeeded, else `Incomplete`.
-    pub(crate) fn complete_if(is_whole: bool) -> Status {
+    pub fn complete_if(is_whole: bool) -> Status {
         if is_whole { Status::Complete } else { Status::Incomplete }
     }
 
     /// The result of a command that only prints text.
-    pub(crate) fn text(status: Status, output: String) -> Self {
+    pub fn text(status: Status, output: String) -> Self {
         Self { status, output, written: Vec::new() }
     }
 
     /// The result of a command that wrote a file or folder, and prints text about it.
-    pub(crate) fn wrote(path: impl Into<PathBuf>, status: Status, output: String) -> Self {
+    pub fn wrote(path: impl Into<PathBuf>, status: Status, output: String) -> Self {
         Self { status, output, written: vec![path.into()] }
     }
 
     /// Makes the text the result, so that `--quiet` prints it, if a format other than the default summary was
     /// requested.
-    pub(crate) fn in_format(mut self, format: StdoutFormat) -> Self {
+    #[must_use]
+    pub fn in_format(mut self, format: StdoutFormat) -> Self {
         if format != StdoutFormat::SUMMARY {
             self.written.clear();
         }
@@ -57,7 +58,7 @@ impl Outcome {
 /// Flags that say how a report is printed, and what is written with it.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Output")]
-pub(crate) struct PrintArgs {
+pub struct PrintArgs {
     /// Print all findings and every table
     #[arg(long, conflicts_with = "findings", add = Decides::Nothing)]
     pub full: bool,
@@ -75,7 +76,7 @@ pub(crate) struct PrintArgs {
 /// Facts that a user states about a run for its report. They do not change what is asked.
 #[derive(Debug, Clone, Copy, Default, Args)]
 #[command(next_help_heading = "Output")]
-pub(crate) struct StatedArgs {
+pub struct StatedArgs {
     /// Light where the images were taken (L0), measured in lux: the report then states thresholds in lux, too, and keeps
     /// it with the run; default: not known
     #[arg(long, alias = "lux-at-L0", value_name = "LUX", value_parser = positive, add = Decides::Nothing)]
@@ -87,20 +88,20 @@ pub(crate) struct StatedArgs {
 }
 
 /// Key of the light at L0, in lux, in the settings of a manifest.
-pub(crate) const LUX_AT_L0: &str = "--lux-at-l0";
+pub const LUX_AT_L0: &str = "--lux-at-l0";
 
 /// Key of the mean exposure value at ISO 100 of the images, and their number, in the settings of a manifest.
-pub(crate) const EXPOSURE_VALUE: &str = "exposure value at ISO 100";
+pub const EXPOSURE_VALUE: &str = "exposure value at ISO 100";
 
 /// Key of the prompt templates in the settings of a manifest, if they are not the built-in ones.
-pub(crate) const PROMPTS: &str = "prompt templates";
+pub const PROMPTS: &str = "prompt templates";
 
 /// Key of the time that an enhancer may take for an image, in milliseconds, in the settings of a manifest.
-pub(crate) const LLIE_BUDGET: &str = "--llie-budget";
+pub const LLIE_BUDGET: &str = "--llie-budget";
 
 impl StatedArgs {
     /// The settings for a manifest, as far as they are stated.
-    pub(crate) fn settings(self) -> impl Iterator<Item = (&'static str, Value)> {
+    pub fn settings(self) -> impl Iterator<Item = (&'static str, Value)> {
         let stated = [(LUX_AT_L0, self.lux_at_l0), (LLIE_BUDGET, self.llie_budget)];
         stated.into_iter().filter_map(|(key, value)| Some((key, json!(value?))))
     }
@@ -109,7 +110,7 @@ impl StatedArgs {
 /// Flags that say what is written beside a report.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Output")]
-pub(crate) struct WrittenArgs {
+pub struct WrittenArgs {
     /// Do not write records.parquet (the records for DuckDB, pandas and R)
     #[arg(long, add = Decides::Nothing)]
     pub no_parquet: bool,
@@ -117,13 +118,13 @@ pub(crate) struct WrittenArgs {
 
 impl PrintArgs {
     /// Whether to write the table of records.
-    pub(crate) fn record_table(&self) -> RecordTable {
+    pub fn record_table(&self) -> RecordTable {
         if self.written.no_parquet { RecordTable::Skip } else { RecordTable::Write }
     }
 
     /// The format requested by the flags.
     #[must_use]
-    pub(crate) fn format(&self) -> StdoutFormat {
+    pub fn format(&self) -> StdoutFormat {
         StdoutFormat {
             syntax: if self.json { Syntax::Json } else { Syntax::Text },
             length: match (self.full, self.findings) {
@@ -137,14 +138,14 @@ impl PrintArgs {
 
 /// Format of a report on standard output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub(crate) struct StdoutFormat {
-    pub(crate) syntax: Syntax,
-    pub(crate) length: ReportLength,
+pub struct StdoutFormat {
+    pub syntax: Syntax,
+    pub length: ReportLength,
 }
 
 /// Syntax of a report on standard output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub(crate) enum Syntax {
+pub enum Syntax {
     Text,
     Markdown,
     Json,
@@ -156,18 +157,18 @@ impl StdoutFormat {
 
     /// True for JSON and Markdown, to which no further lines may be added.
     #[must_use]
-    pub(crate) fn is_document(self) -> bool {
+    pub fn is_document(self) -> bool {
         self.syntax != Syntax::Text
     }
 
-    pub(crate) fn is_json(self) -> bool {
+    pub fn is_json(self) -> bool {
         self.syntax == Syntax::Json
     }
 }
 
 /// Whether to write `records.parquet` next to the records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum RecordTable {
+pub enum RecordTable {
     Write,
     /// Set by `--no-parquet`.
     Skip,
@@ -175,7 +176,7 @@ pub(crate) enum RecordTable {
 
 /// Parts of a report that are printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub(crate) enum ReportLength {
+pub enum ReportLength {
     /// Summary, main finding of each group, and table by level.
     Summary,
     /// Summary and all findings.
@@ -189,22 +190,22 @@ const ENTRY: &str = "--max-cost exceeded";
 
 /// Cost of a run that exceeded its limit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct OverBudget {
+pub struct OverBudget {
     /// The limit, in US dollars.
-    pub(crate) limit: f64,
+    pub limit: f64,
     /// The cost, in US dollars.
-    pub(crate) spent: f64,
+    pub spent: f64,
     /// Number of replies that were charged more tokens than their limit, by model.
     #[serde(default)]
-    pub(crate) longer_replies: BTreeMap<String, usize>,
+    pub longer_replies: BTreeMap<String, usize>,
     /// Number of replies that were charged more than the price table says, by model.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub(crate) dearer_replies: BTreeMap<String, usize>,
+    pub dearer_replies: BTreeMap<String, usize>,
 }
 
 impl OverBudget {
     /// Replaces the note in a manifest; removes it if the run is within its limit.
-    pub(crate) fn note(over: Option<&Self>, manifest: &mut RunManifest) {
+    pub fn note(over: Option<&Self>, manifest: &mut RunManifest) {
         manifest.settings.remove(ENTRY);
         if let Some(over) = over {
             manifest.settings.insert(ENTRY.to_owned(), json!(over));
@@ -212,12 +213,12 @@ impl OverBudget {
     }
 
     /// Reads the note in a manifest; `None` if there is none.
-    pub(crate) fn read(manifest: &RunManifest) -> Option<Self> {
+    pub fn read(manifest: &RunManifest) -> Option<Self> {
         serde_json::from_value(manifest.settings.get(ENTRY)?.clone()).ok()
     }
 
     /// A sentence about the cost, with the cause if it is known.
-    pub(crate) fn sentence(&self) -> String {
+    pub fn sentence(&self) -> String {
         let causes = [
             (&self.longer_replies, "replies that were charged more tokens than --max-tokens"),
             (&self.dearer_replies, "replies that were charged more than the price table"),

@@ -3,15 +3,15 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
-use crate::ask::prompts::blind_answer;
-use crate::types::{OpenDetail, QuestionId, Record, Step, Via, View};
+use darkqa_ask::prompts::blind_answer;
+use darkqa_base::types::{OpenDetail, QuestionId, Record, Step, Via, View};
 use darkqa_score::choice::llm_match::{Protocol, truncate_answer};
 use darkqa_score::choice::open_answer;
 use darkqa_score::model_in_condition::ModelInCondition;
 
 /// The state of one answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum AnswerState {
+pub enum AnswerState {
     /// No reply yet, or the trial failed.
     Missing,
     /// A reply without an answer. It scores 0 without being judged.
@@ -26,18 +26,18 @@ pub(crate) enum AnswerState {
 
 /// One answer to one question.
 #[derive(Debug, Clone)]
-pub(crate) struct QuestionAnswer {
-    pub(crate) subject: ModelInCondition,
+pub struct QuestionAnswer {
+    pub subject: ModelInCondition,
     /// Index of the question among those of the run.
-    pub(crate) question: usize,
+    pub question: usize,
     /// Answer before the protocol shortens it; `None` if there is none.
-    pub(crate) full_answer: Option<String>,
-    pub(crate) state: AnswerState,
+    pub full_answer: Option<String>,
+    pub state: AnswerState,
 }
 
 /// All answers of a run in the order of its questions: requested ones, including missing ones, and those from files. A
 /// subject that was asked any question is expected to have answers to all.
-pub(crate) fn predictions(
+pub fn predictions(
     records: &[Record<OpenDetail>],
     questions: &[&QuestionId],
     protocol: Protocol,
@@ -72,7 +72,7 @@ pub(crate) fn predictions(
 }
 
 /// The state of the answer in a record that has not failed.
-pub(crate) fn answer_state(record: &Record<OpenDetail>, protocol: Protocol) -> AnswerState {
+pub fn answer_state(record: &Record<OpenDetail>, protocol: Protocol) -> AnswerState {
     state(Some(record), protocol).1
 }
 

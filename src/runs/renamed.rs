@@ -12,22 +12,22 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
-use crate::ask::ChangedSetting;
-use crate::error::Result;
-use crate::types::manifests::{Fit, RecordedNames, RunManifest, StoredViews, Views};
-use crate::types::replies::OBSERVER;
-use crate::types::{Control, Digest, Record, Trials};
+use darkqa_ask::ChangedSetting;
+use darkqa_base::error::Result;
+use darkqa_base::types::manifests::{Fit, RecordedNames, RunManifest, StoredViews, Views};
+use darkqa_base::types::replies::OBSERVER;
+use darkqa_base::types::{Control, Digest, Record, Trials};
 use darkqa_score::answers::record::Detail;
 
 /// Prefix of the manifest settings that hold the changes to the requests to a model; the model's name follows.
-pub(crate) const ADAPTED_FOR: &str = "adapted for ";
+pub const ADAPTED_FOR: &str = "adapted for ";
 
 /// Manifest setting that lists the models that are no longer in the models file.
 const LEFT_OUT: &str = "models left out";
 
 /// Whether the settings of a model may change within a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum SettingsChange {
+pub enum SettingsChange {
     /// A model with other settings is another model of the same run; used with a models file, which names each model.
     Allowed,
     /// A model with other settings belongs to another run.
@@ -36,13 +36,13 @@ pub(crate) enum SettingsChange {
 
 /// Models of the current command.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct CurrentModels<'a> {
+pub struct CurrentModels<'a> {
     /// Settings that determine the replies of each model, by name.
-    pub(crate) models: &'a BTreeMap<String, Value>,
+    pub models: &'a BTreeMap<String, Value>,
     /// Inputs of each model, by name.
-    pub(crate) views: &'a Views,
+    pub views: &'a Views,
     /// Whether the settings of the stored models may change.
-    pub(crate) settings: SettingsChange,
+    pub settings: SettingsChange,
 }
 
 /// Notes in a manifest which models of the stored manifest have another name now. Two names belong to the same model if
@@ -51,11 +51,7 @@ pub(crate) struct CurrentModels<'a> {
 ///
 /// # Errors
 /// If a number in the settings of a model is not finite.
-pub(crate) fn note_renamed_models(
-    manifest: &mut RunManifest,
-    stored: &RunManifest,
-    command: CurrentModels<'_>,
-) -> Result<()> {
+pub fn note_renamed_models(manifest: &mut RunManifest, stored: &RunManifest, command: CurrentModels<'_>) -> Result<()> {
     let CurrentModels { models: now, settings, .. } = command;
     let empty = BTreeMap::new();
     let before = stored.columns.get("model").unwrap_or(&empty);
@@ -209,12 +205,12 @@ fn reply_settings(content: &Value) -> Value {
 }
 
 /// Models that reports leave out.
-pub(crate) fn left_out_models(manifest: &RunManifest) -> Vec<String> {
+pub fn left_out_models(manifest: &RunManifest) -> Vec<String> {
     manifest.settings.get(LEFT_OUT).cloned().and_then(|names| serde_json::from_value(names).ok()).unwrap_or_default()
 }
 
 /// Changes the model name in a record to the current one.
-pub(crate) fn rename_record<D>(record: &mut Record<D>, names: &RecordedNames) {
+pub fn rename_record<D>(record: &mut Record<D>, names: &RecordedNames) {
     let current = names.table_name(&record.model);
     if current != record.model {
         record.model = current.to_owned();
@@ -222,7 +218,7 @@ pub(crate) fn rename_record<D>(record: &mut Record<D>, names: &RecordedNames) {
 }
 
 /// Changes the model names in trials to the current ones.
-pub(crate) fn rename_trials<D: Detail>(trials: &mut Trials<D>, manifest: &RunManifest) {
+pub fn rename_trials<D: Detail>(trials: &mut Trials<D>, manifest: &RunManifest) {
     let names = RecordedNames::from_manifest(manifest);
     trials.rename(|model| {
         let current = names.table_name(model);
@@ -231,37 +227,37 @@ pub(crate) fn rename_trials<D: Detail>(trials: &mut Trials<D>, manifest: &RunMan
 }
 
 /// Prefix of the manifest settings that list the settings of a model that changed within the run; its name follows.
-pub(crate) const CHANGED_FOR: &str = "changed for ";
+pub const CHANGED_FOR: &str = "changed for ";
 
 /// Prefix of the manifest settings that list the flags of a model whose values a server refused; its name follows.
-pub(crate) const REFUSED_FOR: &str = "refused for ";
+pub const REFUSED_FOR: &str = "refused for ";
 
 /// Words before the name of a judge, whose settings differ from those of a model of the same name.
 const JUDGE: &str = "the judge ";
 
 /// Key of a manifest setting about a model or judge.
-pub(crate) fn key(prefix: &str, model: &str, is_judge: bool) -> String {
+pub fn key(prefix: &str, model: &str, is_judge: bool) -> String {
     let judge = if is_judge { JUDGE } else { "" };
     format!("{prefix}{judge}{model}")
 }
 
 /// True if later commands must keep the manifest setting.
-pub(crate) fn is_kept(key: &str) -> bool {
+pub fn is_kept(key: &str) -> bool {
     [CHANGED_FOR, REFUSED_FOR].iter().any(|prefix| key.starts_with(prefix))
 }
 
 /// The strings in an array; none if the value is missing or not an array.
-pub(crate) fn strings(value: Option<&Value>) -> Vec<String> {
+pub fn strings(value: Option<&Value>) -> Vec<String> {
     value.and_then(|value| serde_json::from_value(value.clone()).ok()).unwrap_or_default()
 }
 
 /// The changes in the value of a manifest setting with the prefix [`CHANGED_FOR`].
-pub(crate) fn changes(value: Option<&Value>) -> Vec<ChangedSetting> {
+pub fn changes(value: Option<&Value>) -> Vec<ChangedSetting> {
     value.and_then(|value| serde_json::from_value(value.clone()).ok()).unwrap_or_default()
 }
 
 /// The changed settings of all models and judges of a run: the name, true for a judge, and the changes.
-pub(crate) fn all(settings: &BTreeMap<String, Value>) -> impl Iterator<Item = (&str, bool, Vec<ChangedSetting>)> {
+pub fn all(settings: &BTreeMap<String, Value>) -> impl Iterator<Item = (&str, bool, Vec<ChangedSetting>)> {
     settings.iter().filter_map(|(key, value)| {
         let owner = key.strip_prefix(CHANGED_FOR)?;
         let judge = owner.strip_prefix(JUDGE);
@@ -270,7 +266,7 @@ pub(crate) fn all(settings: &BTreeMap<String, Value>) -> impl Iterator<Item = (&
 }
 
 /// The current value of a model's setting, by its flag; `None` if it is unset.
-pub(crate) fn current(manifest: &RunManifest, model: &str, flag: &str) -> Option<Value> {
+pub fn current(manifest: &RunManifest, model: &str, flag: &str) -> Option<Value> {
     let changes = changes(manifest.settings.get(&key(CHANGED_FOR, model, false)));
     let changed = changes.into_iter().rfind(|change| change.flag == flag);
     let first = || manifest.columns.get("model")?.get(model)?.get(flag).cloned();

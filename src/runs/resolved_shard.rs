@@ -10,18 +10,18 @@ use clap::Args;
 use super::batch_system::{ArrayTask, Membership, TaskRange};
 use super::shard::{Division, divisions_in};
 use super::shard_records::{WeightedSource, shard_range};
-use crate::error::{Error, Result};
-use crate::runs::batch_system::BatchSystem;
-use crate::runs::shard::{Shard, number, usage_error};
-use crate::types::Decides;
-use crate::types::text::counted;
+use crate::batch_system::BatchSystem;
+use crate::shard::{Shard, number, usage_error};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Decides;
+use darkqa_base::types::text::counted;
 
 /// The shard that a process does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct ResolvedShard {
-    pub(crate) shard: Shard,
+pub struct ResolvedShard {
+    pub shard: Shard,
     /// The array whose tasks do the shards; `None` for shards that the user names.
-    pub(crate) tasks: Option<TaskRange>,
+    pub tasks: Option<TaskRange>,
 }
 
 /// The number of shards that `--shard` states.
@@ -56,7 +56,7 @@ impl ResolvedShard {
     ///
     /// # Errors
     /// If there is no such shard, or the batch system does not determine it.
-    pub(crate) fn resolve(
+    pub fn resolve(
         flag: Option<&str>,
         variable: impl Fn(&str) -> Option<String>,
         folder: Option<&Path>,
@@ -223,7 +223,7 @@ const NO_SYSTEM: &str = "auto is for a task of a Slurm array (SLURM_ARRAY_TASK_I
 
 /// The `--shard` flag.
 #[derive(Debug, Clone, Default, Args)]
-pub(crate) struct ShardArgs {
+pub struct ShardArgs {
     /// Process only this shard of the frames, as 2/4, or auto/4 for the task of a Slurm array or the pod of an indexed
     /// Kubernetes job. All shards together write what one call does; default: all frames
     #[arg(long, value_name = "I/N|auto/N|auto", help_heading = "Scale", add = Decides::Trials)]
@@ -235,7 +235,7 @@ impl ShardArgs {
     ///
     /// # Errors
     /// As for [`shard_from_flag`].
-    pub(crate) fn resolve(&self) -> Result<Shard> {
+    pub fn resolve(&self) -> Result<Shard> {
         shard_from_flag(self.shard.as_deref())
     }
 }
@@ -245,7 +245,7 @@ impl ShardArgs {
 ///
 /// # Errors
 /// If there is no such shard, or the variables of the batch system do not determine it.
-pub(crate) fn shard_from_flag(flag: Option<&str>) -> Result<Shard> {
+pub fn shard_from_flag(flag: Option<&str>) -> Result<Shard> {
     let flag = flag.unwrap_or("none");
     ResolvedShard::resolve(Some(flag), |name| std::env::var(name).ok(), None).map(|resolved| resolved.shard)
 }
@@ -254,7 +254,7 @@ pub(crate) fn shard_from_flag(flag: Option<&str>) -> Result<Shard> {
 ///
 /// # Errors
 /// If the shard is empty.
-pub(crate) fn keep_shard<T>(frames: &mut Vec<T>, shard: Shard) -> Result<()> {
+pub fn keep_shard<T>(frames: &mut Vec<T>, shard: Shard) -> Result<()> {
     if !shard.is_part() {
         return Ok(());
     }

@@ -23,18 +23,18 @@ use serde::{Deserialize, Serialize};
 
 use super::forecast::Forecast;
 use super::shard_records::{WeightedSource, shard_range};
-use crate::data::Dataset;
-use crate::error::{Error, Result};
-use crate::files::{self, UNFINISHED};
-use crate::runs::shard::Shard;
-use crate::store::{self, PLAN};
-use crate::types::flags::setting_spelling;
-use crate::types::manifests::{Identity, differences};
-use crate::types::{Digest, FrameId, Question, RunQuestion, shell_word};
+use crate::shard::Shard;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{self, UNFINISHED};
+use darkqa_base::types::flags::setting_spelling;
+use darkqa_base::types::manifests::{Identity, differences};
+use darkqa_base::types::{Digest, FrameId, Question, RunQuestion, shell_word};
+use darkqa_data::Dataset;
+use darkqa_store::PLAN;
 
 /// The plan of a run, as read from its folder.
 #[derive(Debug)]
-pub(crate) struct RunPlan {
+pub struct RunPlan {
     folder: PathBuf,
     identity: Identity,
     /// The planned questions, in order.
@@ -52,7 +52,7 @@ impl RunPlan {
     ///
     /// # Errors
     /// If the plan cannot be read, has another schema, or one of its files has changed.
-    pub(crate) fn read(run: &Path) -> Result<Option<Self>> {
+    pub fn read(run: &Path) -> Result<Option<Self>> {
         let folder = run.join(PLAN);
         let path = folder.join(PLAN_FILE);
         if !path.exists() {
@@ -84,7 +84,7 @@ impl RunPlan {
     ///
     /// # Errors
     /// Names the setting that differs.
-    pub(crate) fn check_identity(&self, run: &Identity) -> Result<()> {
+    pub fn check_identity(&self, run: &Identity) -> Result<()> {
         // Name a whole setting rather than a part of it: the variant rather than one of its noise profiles.
         let differences = differences(&self.identity, run);
         match differences.min_by_key(|(field, ..)| field.contains(" of the ")) {
@@ -101,7 +101,7 @@ impl RunPlan {
     ///
     /// # Errors
     /// If a question of the data is not the planned one, or its frame is missing.
-    pub(crate) fn questions(&self, dataset: &Dataset, own: &[Question]) -> Result<Vec<Question>> {
+    pub fn questions(&self, dataset: &Dataset, own: &[Question]) -> Result<Vec<Question>> {
         if !own.is_empty() {
             self.check_questions(dataset, own)?;
         }
@@ -140,7 +140,7 @@ impl RunPlan {
     }
 
     /// The index of each planned question among all questions of the data set.
-    pub(crate) fn question_places(&self) -> impl Iterator<Item = usize> {
+    pub fn question_places(&self) -> impl Iterator<Item = usize> {
         self.questions.iter().map(|question| question.place)
     }
 
@@ -148,7 +148,7 @@ impl RunPlan {
     ///
     /// # Errors
     /// If a frame has changed or is not planned; names the frame.
-    pub(crate) fn check_images<'a>(&self, images: impl IntoIterator<Item = (&'a FrameId, Digest)>) -> Result<()> {
+    pub fn check_images<'a>(&self, images: impl IntoIterator<Item = (&'a FrameId, Digest)>) -> Result<()> {
         for (name, digest) in images {
             let planned = self.frame(name).map(|frame| frame.digest);
             let problem = match planned {
@@ -173,28 +173,28 @@ impl RunPlan {
     }
 
     /// The digest of a frame; `None` if it is not planned, or no model of the plan sees images.
-    pub(crate) fn digest(&self, name: &FrameId) -> Option<Digest> {
+    pub fn digest(&self, name: &FrameId) -> Option<Digest> {
         self.frame(name)?.digest
     }
 
     /// The cost of a frame by which a run is divided into shards, in microseconds; 1 if the frame is not planned.
-    pub(crate) fn weight(&self, name: &str) -> u64 {
+    pub fn weight(&self, name: &str) -> u64 {
         let frame = self.frame(&FrameId(name.to_owned()));
         frame.map_or(1, |frame| frame.cost.weight())
     }
 
     /// Number of planned frames.
-    pub(crate) fn frame_count(&self) -> usize {
+    pub fn frame_count(&self) -> usize {
         self.frames.len()
     }
 
     /// Number of requests about the frames with these indices, to all models of the plan.
-    pub(crate) fn request_count(&self, places: impl Iterator<Item = usize>) -> usize {
+    pub fn request_count(&self, places: impl Iterator<Item = usize>) -> usize {
         places.filter_map(|place| self.frames.get(place)).map(|frame| frame.cost.requests).sum()
     }
 
     /// The indices of the frames of a shard.
-    pub(crate) fn shard_range(&self, shard: Shard) -> Range<usize> {
+    pub fn shard_range(&self, shard: Shard) -> Range<usize> {
         let sources: Vec<WeightedSource> = self
             .frames
             .iter()
@@ -205,7 +205,7 @@ impl RunPlan {
 
     /// A shard's share of the estimated cost, from 0 to 1: by dollars if all are known, else by tokens, else by
     /// requests.
-    pub(crate) fn cost_share(&self, shard: Shard) -> f64 {
+    pub fn cost_share(&self, shard: Shard) -> f64 {
         let own = self.shard_range(shard);
         let share_by = |cost: &dyn Fn(&FrameCost) -> Option<f64>| {
             let sum =
@@ -221,7 +221,7 @@ impl RunPlan {
 
     /// The command of the run without `--shard`; `None` if the plan does not have it, or if models other than its own
     /// were asked.
-    pub(crate) fn command<'a>(&self, asked: impl Iterator<Item = &'a str>) -> Option<String> {
+    pub fn command<'a>(&self, asked: impl Iterator<Item = &'a str>) -> Option<String> {
         let planned: BTreeSet<&str> = self.models.iter().map(|name| &**name).collect();
         let words = self.command.as_ref()?;
         let command = words.iter().map(|word| shell_word(word)).collect::<Vec<_>>().join(" ");
@@ -301,26 +301,26 @@ pub(super) struct PlanCounts {
 
 /// Estimate of a run, as printed by `--dry-run`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct PlanEstimate {
+pub struct PlanEstimate {
     /// Number of images to make.
-    pub(crate) images: usize,
+    pub images: usize,
     /// Time to make the images on the machine that wrote the plan, in seconds, extrapolated from a few.
-    pub(crate) making_seconds: f64,
+    pub making_seconds: f64,
     /// CPU time of all frames in `frames.jsonl`, in seconds. Shards are divided by it.
-    pub(crate) cpu_seconds: f64,
+    pub cpu_seconds: f64,
     /// Time waiting for replies, in seconds.
-    pub(crate) asking_seconds: f64,
+    pub asking_seconds: f64,
     /// Bytes to send.
-    pub(crate) bytes: f64,
+    pub bytes: f64,
     /// Tokens of requests and replies, assuming short replies; `None` if the image tokens of a model are unknown.
-    pub(crate) tokens: Option<f64>,
+    pub tokens: Option<f64>,
     /// Cost in US dollars, assuming short replies; `None` if a price is unknown.
-    pub(crate) dollars: Option<f64>,
+    pub dollars: Option<f64>,
 }
 
 impl PlanEstimate {
     /// The estimate of a plan whose frames take `cpu_seconds` of CPU time.
-    pub(crate) fn new(forecast: &Forecast, cpu_seconds: f64) -> Self {
+    pub fn new(forecast: &Forecast, cpu_seconds: f64) -> Self {
         let lines = &forecast.lines;
         let tokens = lines
             .iter()
@@ -343,7 +343,7 @@ const SECRET_FLAGS: [&str; 2] = ["--header", "--extra-body"];
 
 /// Converts the words of a `plan` command to those of an evaluation. `None` if one of them may be secret: a header, a
 /// request field, or a URL with a password or a query.
-pub(crate) fn recorded_command(words: &[String]) -> Option<Vec<String>> {
+pub fn recorded_command(words: &[String]) -> Option<Vec<String>> {
     if words.iter().any(|word| may_be_secret(word)) {
         return None;
     }
@@ -371,15 +371,15 @@ fn may_be_secret(word: &str) -> bool {
 /// Estimated cost of all images and requests of a frame. It depends on the plan alone, so that every shard computes the
 /// same division.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub(crate) struct FrameCost {
+pub struct FrameCost {
     /// CPU time, in seconds.
-    pub(crate) seconds: f64,
+    pub seconds: f64,
     /// Number of requests.
-    pub(crate) requests: usize,
+    pub requests: usize,
     /// Tokens of all requests and replies, assuming short replies; `None` if the image tokens of a model are unknown.
-    pub(crate) tokens: Option<f64>,
+    pub tokens: Option<f64>,
     /// Cost in US dollars, assuming short replies; `None` if a price or a number of tokens is unknown.
-    pub(crate) dollars: Option<f64>,
+    pub dollars: Option<f64>,
 }
 
 impl FrameCost {
@@ -391,31 +391,31 @@ impl FrameCost {
 
 /// One line of `frames.jsonl`: a frame with questions, or several frames that a question shows together.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct PlannedFrame {
+pub struct PlannedFrame {
     /// Name of the frame, or of several together.
-    pub(crate) frame: FrameId,
+    pub frame: FrameId,
     /// Scene of the frame; empty if the data set has no scenes.
-    pub(crate) scene: String,
+    pub scene: String,
     /// Image file; `None` for rooms, images inside a larger file, and several frames.
-    pub(crate) path: Option<PathBuf>,
+    pub path: Option<PathBuf>,
     /// Size of the file in bytes when the plan was written; for information only.
-    pub(crate) size: Option<u64>,
+    pub size: Option<u64>,
     /// Modification time of the file in UTC when the plan was written; for information only.
-    pub(crate) mtime: Option<String>,
+    pub mtime: Option<String>,
     /// Width of the image in pixels (of the middle one if there are several); `None` if no model sees images.
-    pub(crate) width: Option<u32>,
+    pub width: Option<u32>,
     /// Height of the image in pixels.
-    pub(crate) height: Option<u32>,
+    pub height: Option<u32>,
     /// Digest of the file (or of all files) and of the decoding rule.
-    pub(crate) digest: Option<Digest>,
-    pub(crate) cost: FrameCost,
+    pub digest: Option<Digest>,
+    pub cost: FrameCost,
     /// Index among the frames of the run.
-    pub(crate) place: usize,
+    pub place: usize,
 }
 
 impl PlannedFrame {
     /// A planned frame with its file. `image` is its size and digest, where models see images.
-    pub(crate) fn new(
+    pub fn new(
         place: usize,
         frame: &FrameId,
         image: (Option<(u32, u32)>, Option<Digest>),
@@ -456,14 +456,14 @@ fn format_utc(time: SystemTime) -> Option<String> {
 }
 
 /// The contents of a plan to write.
-pub(crate) struct NewPlan {
-    pub(crate) identity: Identity,
-    pub(crate) questions: Vec<RunQuestion>,
-    pub(crate) frames: Vec<PlannedFrame>,
-    pub(crate) models: Vec<String>,
-    pub(crate) command: Option<Vec<String>>,
+pub struct NewPlan {
+    pub identity: Identity,
+    pub questions: Vec<RunQuestion>,
+    pub frames: Vec<PlannedFrame>,
+    pub models: Vec<String>,
+    pub command: Option<Vec<String>>,
     /// Number of trials of the whole run.
-    pub(crate) trials: usize,
+    pub trials: usize,
 }
 
 impl NewPlan {
@@ -474,7 +474,7 @@ impl NewPlan {
     ///
     /// # Errors
     /// If the run has shards of an earlier plan with other questions or frames, or a file cannot be written.
-    pub(crate) fn write(mut self, run: &Path, forecast: &Forecast) -> Result<PathBuf> {
+    pub fn write(mut self, run: &Path, forecast: &Forecast) -> Result<PathBuf> {
         let folder = run.join(PLAN);
         let earlier = RunPlan::read(run)?;
         if let Some(earlier) = &earlier {
@@ -546,7 +546,7 @@ impl NewPlan {
 /// Folder of the first shard of a run, if any.
 fn first_shard(run: &Path) -> Result<Option<PathBuf>> {
     for path in files::entries(run)? {
-        if path.is_dir() && store::schema(&path)?.is_some() {
+        if path.is_dir() && darkqa_store::schema(&path)?.is_some() {
             return Ok(Some(path));
         }
     }

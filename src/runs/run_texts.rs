@@ -6,14 +6,14 @@ use std::sync::Arc;
 
 use tempfile::TempDir;
 
-use crate::error::{Error, Result};
-use crate::store::{RecordLog, each_question};
-use crate::types::{QuestionId, Record, RunQuestion, TextPlace};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::{QuestionId, Record, RunQuestion, TextPlace};
 use darkqa_score::answers::record::Detail;
+use darkqa_store::{RecordLog, each_question};
 
 /// Source of the replies of a run and of the evidence of its questions.
 #[derive(Debug, Clone)]
-pub(crate) enum RunTexts<D> {
+pub enum RunTexts<D> {
     /// The files of the run.
     Stored(Arc<StoredTexts>),
     /// The files of the shards, by [`TextPlace::log`].
@@ -26,20 +26,20 @@ pub(crate) enum RunTexts<D> {
 
 /// The files of a run.
 #[derive(Debug)]
-pub(crate) struct StoredTexts {
+pub struct StoredTexts {
     folder: PathBuf,
     log: RecordLog,
 }
 
 /// Records and questions in memory.
 #[derive(Debug)]
-pub(crate) struct InMemoryTexts<D> {
+pub struct InMemoryTexts<D> {
     records: Vec<Record<D>>,
     questions: Vec<RunQuestion>,
 }
 
 impl<D> InMemoryTexts<D> {
-    pub(crate) fn new(records: Vec<Record<D>>, questions: Vec<RunQuestion>) -> Self {
+    pub fn new(records: Vec<Record<D>>, questions: Vec<RunQuestion>) -> Self {
         Self { records, questions }
     }
 }
@@ -49,7 +49,7 @@ impl<D: Detail> RunTexts<D> {
     ///
     /// # Errors
     /// If the file of records cannot be opened.
-    pub(crate) fn open(folder: &Path) -> Result<Self> {
+    pub fn open(folder: &Path) -> Result<Self> {
         Ok(match RecordLog::open_if_exists(folder)? {
             None => Self::InMemory(InMemoryTexts::new(Vec::new(), Vec::new()).into()),
             Some(log) => {
@@ -60,7 +60,7 @@ impl<D: Detail> RunTexts<D> {
     }
 
     /// The texts of each file, by [`TextPlace::log`].
-    pub(crate) fn by_file(self) -> Vec<Self> {
+    pub fn by_file(self) -> Vec<Self> {
         match self {
             Self::Shards(parts) => parts,
             one => vec![one],
@@ -71,7 +71,7 @@ impl<D: Detail> RunTexts<D> {
     ///
     /// # Errors
     /// If the file of records cannot be read any more, or was changed.
-    pub(crate) fn record(&self, place: TextPlace) -> Result<Record<D>> {
+    pub fn record(&self, place: TextPlace) -> Result<Record<D>> {
         match self {
             Self::Stored(texts) => {
                 let line = texts.log.line_from(place.start())?;
@@ -96,7 +96,7 @@ impl<D: Detail> RunTexts<D> {
     ///
     /// # Errors
     /// As for [`record`](Self::record).
-    pub(crate) fn text(&self, place: TextPlace) -> Result<String> {
+    pub fn text(&self, place: TextPlace) -> Result<String> {
         let record = self.record(place)?;
         Ok(record.text_or_error().unwrap_or_default().to_owned())
     }
@@ -105,11 +105,7 @@ impl<D: Detail> RunTexts<D> {
     ///
     /// # Errors
     /// If the questions of the run cannot be read.
-    pub(crate) fn questions(
-        &self,
-        wanted: &HashSet<&QuestionId>,
-        found: &mut HashMap<QuestionId, RunQuestion>,
-    ) -> Result<()> {
+    pub fn questions(&self, wanted: &HashSet<&QuestionId>, found: &mut HashMap<QuestionId, RunQuestion>) -> Result<()> {
         let mut add = |question: RunQuestion| {
             if wanted.contains(&question.id) {
                 found.entry(question.id.clone()).or_insert(question);

@@ -13,16 +13,15 @@ use std::{fmt, fs};
 use serde_json::{Value, json};
 
 use super::batch_system::{ArrayTask, TaskRange};
-use crate::ask::Quota;
-use crate::error::{Error, Result};
-use crate::store;
-use crate::types::manifests::RunManifest;
-use crate::types::text::money;
+use darkqa_ask::Quota;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_base::types::text::money;
 
 /// One of several parts of a run, with consecutive sources. Each source is in one shard, with all its conditions and
-/// questions. See [`shard_questions`](crate::runs::shard_records::shard_questions) for the division.
+/// questions. See [`shard_questions`](crate::shard_records::shard_questions) for the division.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Shard {
+pub struct Shard {
     /// Index of the shard, from 0.
     index: u32,
     count: NonZeroU32,
@@ -30,26 +29,26 @@ pub(crate) struct Shard {
 
 impl Shard {
     /// The only shard of a run that is not divided.
-    pub(crate) const WHOLE: Self = Self { index: 0, count: NonZeroU32::MIN };
+    pub const WHOLE: Self = Self { index: 0, count: NonZeroU32::MIN };
 
     /// True if there are other shards.
     #[must_use]
-    pub(crate) fn is_part(self) -> bool {
+    pub fn is_part(self) -> bool {
         self.count.get() > 1
     }
 
     #[must_use]
-    pub(crate) fn count(self) -> NonZeroU32 {
+    pub fn count(self) -> NonZeroU32 {
         self.count
     }
 
     /// All shards of a run with `count` of them.
-    pub(crate) fn all(count: NonZeroU32) -> impl Iterator<Item = Self> {
+    pub fn all(count: NonZeroU32) -> impl Iterator<Item = Self> {
         (0..count.get()).map(move |index| Self { index, count })
     }
 
     /// Index of the shard, from 0.
-    pub(crate) fn index(self) -> u32 {
+    pub fn index(self) -> u32 {
         self.index
     }
 
@@ -63,13 +62,13 @@ impl Shard {
 
     /// This shard's equal share of a cost.
     #[must_use]
-    pub(crate) fn share_of_cost(self, whole: f64) -> f64 {
+    pub fn share_of_cost(self, whole: f64) -> f64 {
         whole / f64::from(self.count.get())
     }
 
     /// Name of the shard's folder within that of the run. [`of_folder`](Self::of_folder) parses it.
     #[must_use]
-    pub(crate) fn folder(self) -> String {
+    pub fn folder(self) -> String {
         let digits = self.count.to_string().len();
         format!("shard-{:0digits$}-of-{}", self.index + 1, self.count)
     }
@@ -82,7 +81,7 @@ impl Shard {
 
     /// This shard's share of the requests and tokens per minute if `workers` shards run in parallel, by default all of
     /// them.
-    pub(crate) fn quota(self, whole: Quota, workers: Option<NonZeroU32>) -> Quota {
+    pub fn quota(self, whole: Quota, workers: Option<NonZeroU32>) -> Quota {
         let at_once = workers.map_or(self.count, |workers| workers.min(self.count));
         Quota {
             requests: whole.requests.map(|whole| self.share(whole, at_once)),
@@ -133,7 +132,7 @@ const BUDGET_ENTRY: &str = "--max-cost of this part";
 
 /// A shard's share of the cost limit of its run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ShardBudget {
+pub struct ShardBudget {
     /// In US dollars.
     share: f64,
     /// Cost of the shard's replies, in US dollars.
@@ -141,7 +140,7 @@ pub(crate) struct ShardBudget {
 }
 
 impl ShardBudget {
-    pub(crate) fn new(share: f64, spent: f64) -> Self {
+    pub fn new(share: f64, spent: f64) -> Self {
         Self { share, spent }
     }
 
@@ -151,18 +150,18 @@ impl ShardBudget {
     }
 
     /// Notes the budget in the manifest of the shard.
-    pub(crate) fn note(self, manifest: &mut RunManifest) {
+    pub fn note(self, manifest: &mut RunManifest) {
         let dollars = json!({ "share": self.share, "spent": self.spent, "left": self.left() });
         manifest.settings.insert(BUDGET_ENTRY.to_owned(), dollars);
     }
 
     /// Removes the note from the manifest of a run joined from shards.
-    pub(crate) fn remove_note(manifest: &mut RunManifest) {
+    pub fn remove_note(manifest: &mut RunManifest) {
         manifest.settings.remove(BUDGET_ENTRY);
     }
 
     /// The sentence about the amount left.
-    pub(crate) fn words(self) -> String {
+    pub fn words(self) -> String {
         format!(
             "{} of its {} of --max-cost are left; other parts do not get them",
             money(self.left()),
@@ -216,12 +215,12 @@ pub(super) fn divisions_in(folder: &Path) -> Vec<Division> {
 /// The array in the manifest of a shard; `None` if there is none, or if the manifest cannot be read: opening the shard
 /// reports that error.
 fn tasks_of(shard: &Path) -> Option<TaskRange> {
-    let settings = store::read_settings(shard).ok()?;
+    let settings = darkqa_store::read_settings(shard).ok()?;
     settings.get(DIVISIONS_ENTRY)?.as_str()?.parse().ok()
 }
 
 /// The manifest setting that notes the array of a shard.
-pub(crate) fn tasks_setting(tasks: TaskRange) -> (String, Value) {
+pub fn tasks_setting(tasks: TaskRange) -> (String, Value) {
     (DIVISIONS_ENTRY.to_owned(), json!(tasks.to_string()))
 }
 

@@ -12,14 +12,14 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::shard::Shard;
-use crate::error::{Error, Result};
-use crate::runs::renamed::rename_record;
-use crate::store::{self, RecordLog, Store, each_record};
-use crate::types::flags::setting_spelling;
-use crate::types::manifests::{PartPlace, RecordedNames, RunManifest, differences};
-use crate::types::text::plural;
-use crate::types::{FrameId, Record, TextPlace, TrialKey, Trials};
+use crate::renamed::rename_record;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::flags::setting_spelling;
+use darkqa_base::types::manifests::{PartPlace, RecordedNames, RunManifest, differences};
+use darkqa_base::types::text::plural;
+use darkqa_base::types::{FrameId, Record, TextPlace, TrialKey, Trials};
 use darkqa_score::answers::record::Detail;
+use darkqa_store::{RecordLog, Store, each_record};
 
 /// Minimum number of bytes in a write. Chosen to make fewer system calls than there are records.
 const CHUNK: usize = 1 << 20;
@@ -29,7 +29,7 @@ const CHUNK: usize = 1 << 20;
 ///
 /// # Errors
 /// If a line is not a record.
-pub(crate) fn read_shard<D: Detail>(
+pub fn read_shard<D: Detail>(
     trials: &mut Trials<D>,
     folder: &Path,
     manifest: &RunManifest,
@@ -54,14 +54,14 @@ fn latest_trials<D: Detail>(folder: &Path, manifest: &RunManifest) -> Result<Tri
 }
 
 /// The record files of several run folders, for reading single records.
-pub(crate) struct ShardLogs<'a> {
+pub struct ShardLogs<'a> {
     folders: Vec<&'a Path>,
     open: HashMap<usize, RecordLog>,
 }
 
 impl<'a> ShardLogs<'a> {
     /// The record files of these folders, by index. Each file is opened when it is first read.
-    pub(crate) fn new(folders: &[&'a Path]) -> Self {
+    pub fn new(folders: &[&'a Path]) -> Self {
         Self { folders: folders.to_vec(), open: HashMap::new() }
     }
 
@@ -76,7 +76,7 @@ impl<'a> ShardLogs<'a> {
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub(crate) fn line(&mut self, place: TextPlace) -> Result<Vec<u8>> {
+    pub fn line(&mut self, place: TextPlace) -> Result<Vec<u8>> {
         self.log(place.log())?.line_from(place.start())
     }
 
@@ -84,7 +84,7 @@ impl<'a> ShardLogs<'a> {
     ///
     /// # Errors
     /// If the line is not a record.
-    pub(crate) fn record<D: Detail>(&mut self, place: TextPlace, line: &[u8]) -> Result<Record<D>> {
+    pub fn record<D: Detail>(&mut self, place: TextPlace, line: &[u8]) -> Result<Record<D>> {
         self.log(place.log())?.record(line)
     }
 }
@@ -94,7 +94,7 @@ impl<'a> ShardLogs<'a> {
 ///
 /// # Errors
 /// If a record cannot be read or written.
-pub(crate) fn append_records<D: Detail>(
+pub fn append_records<D: Detail>(
     store: &mut Store<D>,
     manifest: &RunManifest,
     shards: &[(&Path, &RunManifest)],
@@ -150,7 +150,7 @@ fn renamed_record<D: Detail>(log: &RecordLog, line: &[u8], names: &RecordedNames
 ///
 /// # Errors
 /// If the shard is empty.
-pub(crate) fn shard_questions<Q>(
+pub fn shard_questions<Q>(
     questions: Vec<Q>,
     shard: Shard,
     source: impl Fn(&Q) -> String,
@@ -184,22 +184,22 @@ pub(crate) fn shard_questions<Q>(
 
 /// The scene and the cost of a source.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct WeightedSource {
+pub struct WeightedSource {
     /// Empty if the source has no scene.
-    pub(crate) scene: String,
+    pub scene: String,
     /// Cost in any unit; 0 counts as 1.
-    pub(crate) cost: u64,
+    pub cost: u64,
 }
 
 impl WeightedSource {
     /// A source without a scene and with the same cost as all others.
-    pub(crate) fn equal() -> Self {
+    pub fn equal() -> Self {
         Self { scene: String::new(), cost: 1 }
     }
 }
 
 /// The indices of a shard's sources; empty only if there are more shards than sources.
-pub(crate) fn shard_range(sources: &[WeightedSource], shard: Shard) -> Range<usize> {
+pub fn shard_range(sources: &[WeightedSource], shard: Shard) -> Range<usize> {
     let mut starts = shard_starts(sources, shard.count().get() as usize);
     starts.push(sources.len());
     let index = shard.index() as usize;
@@ -241,14 +241,14 @@ fn cost(source: &WeightedSource) -> u128 {
 
 /// Shards of a run that was divided into another number of shards, for example because a job array was stopped and
 /// restarted with another size. Their replies are reused.
-pub(crate) struct OtherShards(Vec<(PathBuf, RunManifest)>);
+pub struct OtherShards(Vec<(PathBuf, RunManifest)>);
 
 impl OtherShards {
     /// Finds the shards of other divisions in the parent folder of a shard.
     ///
     /// # Errors
     /// If one belongs to another run, or another process is writing to it and might ask the same questions.
-    pub(crate) fn find<D: Detail>(folder: &Path, manifest: &RunManifest) -> Result<Self> {
+    pub fn find<D: Detail>(folder: &Path, manifest: &RunManifest) -> Result<Self> {
         let mut shards = Vec::new();
         let (Some(own), Some(run)) = (shard_count(manifest), folder.parent()) else {
             return Ok(Self(shards));
@@ -256,10 +256,10 @@ impl OtherShards {
         let entries = fs::read_dir(run).map_err(|e| Error::file(run, "read", e))?;
         for entry in entries {
             let path = entry.map_err(|e| Error::file(run, "read", e))?.path();
-            if store::schema(&path)?.is_none_or(|schema| schema != D::SCHEMA) {
+            if darkqa_store::schema(&path)?.is_none_or(|schema| schema != D::SCHEMA) {
                 continue;
             }
-            let Some(other) = store::read_manifest(&path, D::SCHEMA)? else {
+            let Some(other) = darkqa_store::read_manifest(&path, D::SCHEMA)? else {
                 continue;
             };
             if shard_count(&other).is_none_or(|count| count == own) {
@@ -274,7 +274,7 @@ impl OtherShards {
                     ),
                 });
             }
-            if store::is_locked(&path)? {
+            if darkqa_store::is_locked(&path)? {
                 return Err(Error::Run {
                     path: path.clone(),
                     problem: format!(
@@ -295,7 +295,7 @@ impl OtherShards {
     ///
     /// # Errors
     /// If a record cannot be read or written.
-    pub(crate) fn copy_into<D: Detail>(
+    pub fn copy_into<D: Detail>(
         &self,
         store: &mut Store<D>,
         manifest: &RunManifest,

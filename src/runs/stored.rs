@@ -6,23 +6,23 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::data::ready_made::is_zip_file;
-use crate::error::{Error, Result};
-use crate::runs::renamed;
-use crate::runs::run_texts::InMemoryTexts;
-use crate::store::{self, Answers, IndexedStart};
-use crate::types::manifests::{Counts, RunManifest, Status};
-use crate::types::{
+use crate::renamed;
+use crate::run_texts::InMemoryTexts;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::{Counts, RunManifest, Status};
+use darkqa_base::types::{
     ChoiceDetail, FailureKind, Finish, ImageFidelity, ListedModel, ModelListing, OpenDetail, QuestionId, Record, Reply,
     RunQuestion, StoredDetail as _, Thumbnail, TrialRef, Trials, shell_word,
 };
+use darkqa_data::ready_made::is_zip_file;
 use darkqa_score::answers::record::{Detail, answered};
+use darkqa_store::{Answers, IndexedStart};
 
-pub(crate) use crate::runs::run_texts::RunTexts;
+pub use crate::run_texts::RunTexts;
 
 /// The models of a run that a report shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum ShownModels {
+pub enum ShownModels {
     /// Models in the models file, and models asked by the last command.
     Current,
     /// Also models that the models file no longer has, or had with other settings.
@@ -31,7 +31,7 @@ pub(crate) enum ShownModels {
 
 /// Location of the files of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum RunLayout {
+pub enum RunLayout {
     /// The folder of the run.
     Whole,
     /// The folders of the shards, inside the folder of the run.
@@ -42,18 +42,18 @@ pub(crate) enum RunLayout {
 
 /// A run with the data that reports need.
 #[derive(Clone)]
-pub(crate) struct StoredRun<D: Detail> {
-    pub(crate) folder: PathBuf,
-    pub(crate) layout: RunLayout,
-    pub(crate) manifest: RunManifest,
-    pub(crate) trials: Trials<D>,
+pub struct StoredRun<D: Detail> {
+    pub folder: PathBuf,
+    pub layout: RunLayout,
+    pub manifest: RunManifest,
+    pub trials: Trials<D>,
     /// The trials of models that a report leaves out.
-    pub(crate) left_out: Trials<D>,
-    pub(crate) texts: RunTexts<D>,
+    pub left_out: Trials<D>,
+    pub texts: RunTexts<D>,
     /// The questions; without their evidence if read from a folder. [`RunTexts::questions`] reads the evidence.
-    pub(crate) questions: Vec<RunQuestion>,
-    pub(crate) thumbnails: Vec<Thumbnail>,
-    pub(crate) fidelity: Vec<ImageFidelity>,
+    pub questions: Vec<RunQuestion>,
+    pub thumbnails: Vec<Thumbnail>,
+    pub fidelity: Vec<ImageFidelity>,
 }
 
 impl<D: Detail> StoredRun<D> {
@@ -62,11 +62,11 @@ impl<D: Detail> StoredRun<D> {
     ///
     /// # Errors
     /// If the folder has no run with records of this kind.
-    pub(crate) fn open(folder: &Path) -> Result<Self> {
-        let manifest = store::read_manifest(folder, D::SCHEMA)?;
+    pub fn open(folder: &Path) -> Result<Self> {
+        let manifest = darkqa_store::read_manifest(folder, D::SCHEMA)?;
         let manifest = manifest.ok_or_else(|| no_run(folder))?;
         let indexed = IndexedStart::check::<D>(folder);
-        let trials = store::read_log(folder, indexed, Answers::Stored, refused_as_filtered)?;
+        let trials = darkqa_store::read_log(folder, indexed, Answers::Stored, refused_as_filtered)?;
         let mut run = Self::from_trials(folder, manifest, trials)?;
         if run.manifest.status == Status::Started {
             let failed = run.trials.iter().map(TrialRef::failed);
@@ -80,8 +80,8 @@ impl<D: Detail> StoredRun<D> {
     ///
     /// # Errors
     /// If a line of a file is broken.
-    pub(crate) fn reread(folder: &Path, manifest: RunManifest, indexed: Option<IndexedStart>) -> Result<Self> {
-        let trials = store::read_log(folder, indexed, Answers::Reread, refused_as_filtered)?;
+    pub fn reread(folder: &Path, manifest: RunManifest, indexed: Option<IndexedStart>) -> Result<Self> {
+        let trials = darkqa_store::read_log(folder, indexed, Answers::Reread, refused_as_filtered)?;
         Self::from_trials(folder, manifest, trials)
     }
 
@@ -93,7 +93,7 @@ impl<D: Detail> StoredRun<D> {
     }
 
     /// The run of a folder, given its manifest, its records, which stay in memory, and its other files.
-    pub(crate) fn from_records(
+    pub fn from_records(
         folder: &Path,
         manifest: RunManifest,
         records: Vec<Record<D>>,
@@ -129,7 +129,7 @@ impl<D: Detail> StoredRun<D> {
     }
 
     /// Moves the trials that a report does not show to [`left_out`](Self::left_out).
-    pub(crate) fn leave_out(&mut self, shown: ShownModels) {
+    pub fn leave_out(&mut self, shown: ShownModels) {
         if shown == ShownModels::Current {
             let names = renamed::left_out_models(&self.manifest);
             if !names.is_empty() {
@@ -143,7 +143,7 @@ impl<D: Detail> StoredRun<D> {
     ///
     /// # Errors
     /// If the file of records cannot be read any more, or was changed.
-    pub(crate) fn record(&self, trial: TrialRef<'_, D>) -> Result<Record<D>> {
+    pub fn record(&self, trial: TrialRef<'_, D>) -> Result<Record<D>> {
         Ok(Record {
             model: trial.model().to_owned(),
             condition: trial.condition().cloned(),
@@ -155,12 +155,12 @@ impl<D: Detail> StoredRun<D> {
     ///
     /// # Errors
     /// As for [`record`](Self::record).
-    pub(crate) fn records_of(&self, question: &str) -> Result<Vec<Record<D>>> {
+    pub fn records_of(&self, question: &str) -> Result<Vec<Record<D>>> {
         self.trials.iter().filter(|trial| trial.question().0 == question).map(|trial| self.record(trial)).collect()
     }
 
     /// Name of the run, which is the name of its folder.
-    pub(crate) fn name(&self) -> String {
+    pub fn name(&self) -> String {
         run_name(&self.folder)
     }
 }
@@ -189,7 +189,7 @@ fn refused_as_filtered<D: Detail>(record: Record<D>) -> Result<Record<D>> {
 }
 
 /// Sorts trials by question, condition and model. Listed models come first, in their order.
-pub(crate) fn sort_trials<'q, D: Detail>(
+pub fn sort_trials<'q, D: Detail>(
     trials: &mut Trials<D>,
     questions: impl Iterator<Item = &'q QuestionId>,
     listed: &[ListedModel],
@@ -200,7 +200,7 @@ pub(crate) fn sort_trials<'q, D: Detail>(
 }
 
 /// Name of the run in a folder or ZIP file: the name of the folder, or of the file without its ending.
-pub(crate) fn run_name(folder: &Path) -> String {
+pub fn run_name(folder: &Path) -> String {
     let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
     let name = if is_zip_file(&whole) { whole.file_stem() } else { whole.file_name() };
     let name = name.unwrap_or(whole.as_os_str());
@@ -209,14 +209,14 @@ pub(crate) fn run_name(folder: &Path) -> String {
 
 /// A run of either experiment. Only this module distinguishes the experiments, by the schema of their folders.
 #[expect(clippy::large_enum_variant, reason = "of the few that are held, none is moved often")]
-pub(crate) enum AnyRun {
+pub enum AnyRun {
     Choice(StoredRun<ChoiceDetail>),
     Open(StoredRun<OpenDetail>),
 }
 
 /// The kind of questions in a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum ExperimentKind {
+pub enum ExperimentKind {
     Choice,
     Open,
 }
@@ -226,13 +226,13 @@ impl ExperimentKind {
     ///
     /// # Errors
     /// If the folder has no run, or one of another version.
-    pub(crate) fn read(folder: &Path) -> Result<Self> {
-        let schema = store::schema(folder)?.ok_or_else(|| no_run(folder))?;
+    pub fn read(folder: &Path) -> Result<Self> {
+        let schema = darkqa_store::schema(folder)?.ok_or_else(|| no_run(folder))?;
         if schema == OpenDetail::SCHEMA {
             return Ok(Self::Open);
         }
         // Returns the error about any other schema.
-        store::read_manifest(folder, ChoiceDetail::SCHEMA)?;
+        darkqa_store::read_manifest(folder, ChoiceDetail::SCHEMA)?;
         Ok(Self::Choice)
     }
 }
@@ -242,7 +242,7 @@ impl AnyRun {
     ///
     /// # Errors
     /// If the folder has no run.
-    pub(crate) fn open(folder: &Path) -> Result<Self> {
+    pub fn open(folder: &Path) -> Result<Self> {
         Ok(match ExperimentKind::read(folder)? {
             ExperimentKind::Choice => Self::Choice(StoredRun::open(folder)?),
             ExperimentKind::Open => Self::Open(StoredRun::open(folder)?),
@@ -255,7 +255,7 @@ impl StoredRun<ChoiceDetail> {
     ///
     /// # Errors
     /// If the folder has no run, or one of open questions. The message ends with `instead`.
-    pub(crate) fn open_choices(folder: &Path, instead: &str) -> Result<Self> {
+    pub fn open_choices(folder: &Path, instead: &str) -> Result<Self> {
         match ExperimentKind::read(folder)? {
             ExperimentKind::Choice => Self::open(folder),
             ExperimentKind::Open => Err(open_questions_error(folder, instead)),
@@ -266,7 +266,7 @@ impl StoredRun<ChoiceDetail> {
     ///
     /// # Errors
     /// If they are not. The message ends with `why`, the reason why they are needed.
-    pub(crate) fn with_truths(self, why: &str) -> Result<Self> {
+    pub fn with_truths(self, why: &str) -> Result<Self> {
         if self.trials.items().into_iter().flatten().all(|item| item.truth.is_some()) {
             return Ok(self);
         }
@@ -281,16 +281,16 @@ impl StoredRun<ChoiceDetail> {
 ///
 /// # Errors
 /// If the folder has no run.
-pub(crate) fn read_run_manifest(folder: &Path) -> Result<RunManifest> {
+pub fn read_run_manifest(folder: &Path) -> Result<RunManifest> {
     let schema = match ExperimentKind::read(folder)? {
         ExperimentKind::Choice => ChoiceDetail::SCHEMA,
         ExperimentKind::Open => OpenDetail::SCHEMA,
     };
-    store::read_manifest(folder, schema)?.ok_or_else(|| no_run(folder))
+    darkqa_store::read_manifest(folder, schema)?.ok_or_else(|| no_run(folder))
 }
 
 /// The error for a run of open questions where one with choices is needed. The message ends with `instead`.
-pub(crate) fn open_questions_error(folder: &Path, instead: &str) -> Error {
+pub fn open_questions_error(folder: &Path, instead: &str) -> Error {
     Error::Run { path: folder.to_owned(), problem: format!("the run asked open questions: {instead}") }
 }
 
@@ -304,7 +304,7 @@ fn list_runs(folder: &Path) -> Vec<String> {
         .flatten()
         .flatten()
         .map(|entry| entry.path())
-        .filter(|path| store::is_run(path))
+        .filter(|path| darkqa_store::is_run(path))
         .map(|path| path.display().to_string())
         .collect();
     runs.sort();
@@ -317,7 +317,7 @@ fn list_runs(folder: &Path) -> Vec<String> {
 }
 
 /// The command that unpacks a ZIP file beside it.
-pub(crate) fn unpack_command(zip: &Path) -> String {
+pub fn unpack_command(zip: &Path) -> String {
     let [zip, target] = [zip, &zip.with_extension("")].map(|path| path.display().to_string());
     format!("python3 -m zipfile -e {} {}", shell_word(&zip), shell_word(&target))
 }
@@ -338,15 +338,15 @@ fn no_run(folder: &Path) -> Error {
 }
 
 /// A setting of a manifest, if it is a text.
-pub(crate) fn text_setting<'a>(manifest: &'a RunManifest, name: &str) -> Option<&'a str> {
+pub fn text_setting<'a>(manifest: &'a RunManifest, name: &str) -> Option<&'a str> {
     manifest.settings.get(name)?.as_str()
 }
 
 /// Contents of the files of a run folder other than its records.
-pub(crate) struct RunFiles {
-    pub(crate) questions: Vec<RunQuestion>,
-    pub(crate) thumbnails: Vec<Thumbnail>,
-    pub(crate) fidelity: Vec<ImageFidelity>,
+pub struct RunFiles {
+    pub questions: Vec<RunQuestion>,
+    pub thumbnails: Vec<Thumbnail>,
+    pub fidelity: Vec<ImageFidelity>,
 }
 
 impl RunFiles {
@@ -354,23 +354,27 @@ impl RunFiles {
     ///
     /// # Errors
     /// If a line of a file is broken.
-    pub(crate) fn read_without_evidence(folder: &Path) -> Result<Self> {
+    pub fn read_without_evidence(folder: &Path) -> Result<Self> {
         let mut questions = Vec::new();
-        store::each_question(folder, |question| {
+        darkqa_store::each_question(folder, |question| {
             questions.push(question.without_evidence());
         })?;
-        Ok(Self { questions, thumbnails: store::read_thumbnails(folder), fidelity: store::read_fidelity(folder) })
+        Ok(Self {
+            questions,
+            thumbnails: darkqa_store::read_thumbnails(folder),
+            fidelity: darkqa_store::read_fidelity(folder),
+        })
     }
 
     /// Reads the files of a run folder.
     ///
     /// # Errors
     /// If a line of a file is broken.
-    pub(crate) fn read(folder: &Path) -> Result<Self> {
+    pub fn read(folder: &Path) -> Result<Self> {
         Ok(Self {
-            questions: store::read_questions(folder)?,
-            thumbnails: store::read_thumbnails(folder),
-            fidelity: store::read_fidelity(folder),
+            questions: darkqa_store::read_questions(folder)?,
+            thumbnails: darkqa_store::read_thumbnails(folder),
+            fidelity: darkqa_store::read_fidelity(folder),
         })
     }
 }

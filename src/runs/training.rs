@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use crate::types::manifests::RunManifest;
+use darkqa_base::types::manifests::RunManifest;
 use darkqa_enhance::ModelFile;
 
 /// The data that each enhancer of a run was trained on, by the enhancer's name. Taken from the run's manifest, or else
 /// from the built-in enhancer with the same digest.
-pub(crate) fn training_data(run: &RunManifest) -> BTreeMap<&str, String> {
+pub fn training_data(run: &RunManifest) -> BTreeMap<&str, String> {
     run.columns
         .get("enhancer")
         .into_iter()

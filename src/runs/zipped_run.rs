@@ -6,12 +6,12 @@ use std::sync::Arc;
 
 use tempfile::TempDir;
 
-use crate::data::ready_made::Archive;
-use crate::error::{Error, Result};
-use crate::runs::run_texts::RunTexts;
-use crate::runs::stored::{AnyRun, RunLayout, StoredRun, unpack_command};
-use crate::store::{MANIFEST, RUN_FILES};
+use crate::run_texts::RunTexts;
+use crate::stored::{AnyRun, RunLayout, StoredRun, unpack_command};
+use darkqa_base::error::{Error, Result};
+use darkqa_data::ready_made::Archive;
 use darkqa_score::answers::record::Detail;
+use darkqa_store::{MANIFEST, RUN_FILES};
 
 /// Opens the run in a ZIP file. Only the files that reports read are unpacked, whatever else is in it.
 ///

@@ -13,8 +13,8 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use crate::ask::requests::ImageDetail;
-use crate::types::text::plural;
+use crate::requests::ImageDetail;
+use darkqa_base::types::text::plural;
 
 /// The built-in table.
 static TABLE: LazyLock<TokenTable> = LazyLock::new(|| {
@@ -105,7 +105,7 @@ pub(crate) fn image_tokens(model: &str, detail: Option<ImageDetail>, width: u64,
 /// Number of tokens of an image for a family that has more of them for larger images, so that fewer tokens mean a
 /// smaller image; `None` for other families: those whose number hardly depends on the size, and Gemini, whose servers
 /// choose the number of crops.
-pub(crate) fn scaling_image_tokens(model: &str, detail: Option<ImageDetail>, width: u64, height: u64) -> Option<u64> {
+pub fn scaling_image_tokens(model: &str, detail: Option<ImageDetail>, width: u64, height: u64) -> Option<u64> {
     let rule = family(model)?.rule;
     let is_scaling = !matches!(rule, Rule::Fixed { .. } | Rule::Crops | Rule::Filled { .. } | Rule::Grid { .. });
     is_scaling.then(|| rule.count(detail, width as f64, height as f64))
@@ -302,7 +302,7 @@ const OTHER_SIZE: f64 = 1.25;
 
 /// Tokens that a server counts for the images of a model, beside the rule of the model's family.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct ImageTokenCheck {
+pub struct ImageTokenCheck {
     replies: Vec<Counted>,
 }
 
@@ -318,7 +318,7 @@ struct Counted {
 
 /// Images that a server shrinks.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ShrunkImages {
+pub struct ShrunkImages {
     /// Median of the tokens that the server counts for an image.
     counted: f64,
     /// Median of the tokens by the rule of the model's family.
@@ -331,7 +331,7 @@ pub(crate) struct ShrunkImages {
 impl ImageTokenCheck {
     /// Adds a reply: the charged tokens of its prompt, the characters of its text, and the tokens of each image by the
     /// rule of the model's family.
-    pub(crate) fn add(&mut self, charged: u64, characters: usize, expected: &[u64]) {
+    pub fn add(&mut self, charged: u64, characters: usize, expected: &[u64]) {
         let images = expected.len() as f64;
         let (charged, characters) = (charged as f64, characters as f64);
         let expected = expected.iter().sum::<u64>() as f64 / images;
@@ -349,7 +349,7 @@ impl ImageTokenCheck {
 
     /// The shrunk images; `None` if the images are sent as they are, if the server does not count them, or if there are
     /// too few replies.
-    pub(crate) fn shrunk(&self) -> Option<ShrunkImages> {
+    pub fn shrunk(&self) -> Option<ShrunkImages> {
         let of_all = |value: fn(&Counted) -> f64| sorted(&self.replies, value);
         let largest = of_all(|one| one.expected).last().copied()?;
         let large: Vec<Counted> = self.replies.iter().copied().filter(|one| one.expected >= LARGE * largest).collect();
@@ -379,7 +379,7 @@ fn sorted(replies: &[Counted], value: impl Fn(&Counted) -> f64) -> Vec<f64> {
 
 impl ShrunkImages {
     /// A sentence about a model.
-    pub(crate) fn words(&self, model: &str) -> String {
+    pub fn words(&self, model: &str) -> String {
         let same = if self.is_same { ", at all sizes" } else { "" };
         format!(
             "{model}: the server counts about {:.0} tokens an image{same}, where the rule of the model's family gives {:.0} ({}): it \

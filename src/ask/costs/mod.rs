@@ -7,9 +7,9 @@ mod spending;
 #[cfg(test)]
 pub(super) use prices::TierFactors;
 
-pub(crate) use image_tokens::{ImageTokenCheck, scaling_image_tokens};
-pub(crate) use prices::{Price, Prices, TokenBound, Unpriced, stated_charge};
-pub(crate) use spending::{ChargeRatios, PricedRequest, ReplyExcess, Reservation, Spending};
+pub use image_tokens::{ImageTokenCheck, scaling_image_tokens};
+pub use prices::{Price, Prices, TokenBound, Unpriced, stated_charge};
+pub use spending::{ChargeRatios, PricedRequest, ReplyExcess, Reservation, Spending};
 
 pub(super) use image_tokens::image_tokens;
 pub(super) use spending::Charge;

@@ -10,15 +10,15 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::error::{Error, Result};
-use crate::files;
-use crate::types::text::TomlFault;
-use crate::types::{ServiceTier, Unstated, Usage};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::text::TomlFault;
+use darkqa_base::types::{ServiceTier, Unstated, Usage};
 
 /// Price of a model, in US dollars per million tokens.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub(crate) struct Price {
+pub struct Price {
     /// Price of prompt tokens, including images, in US dollars per million.
     pub input: f64,
     /// Price of reply tokens, including hidden reasoning, in US dollars per million.
@@ -42,13 +42,13 @@ const MAX_RATIO: f64 = 100.0;
 impl Price {
     /// Cost of this many prompt and reply tokens, in US dollars.
     #[must_use]
-    pub(crate) fn cost(&self, prompt: f64, reply: f64) -> f64 {
+    pub fn cost(&self, prompt: f64, reply: f64) -> f64 {
         (prompt * self.input + reply * self.output) / 1e6
     }
 
     /// Maximum cost of a request within a token bound, in US dollars.
     #[must_use]
-    pub(crate) fn max_cost(&self, bound: TokenBound) -> f64 {
+    pub fn max_cost(&self, bound: TokenBound) -> f64 {
         let input = self.input.max(self.cached_input.unwrap_or(self.input));
         (bound.prompt as f64 * input + bound.reply as f64 * self.output) / 1e6
     }
@@ -56,14 +56,14 @@ impl Price {
     /// Charge for a request in US dollars: the charge that the server states, if it is plausible, else the price of its
     /// tokens.
     #[must_use]
-    pub(crate) fn charged(&self, usage: Usage) -> f64 {
+    pub fn charged(&self, usage: Usage) -> f64 {
         self.charged_in_part(usage, 1.0)
     }
 
     /// Charge for a request whose tokens cost only a `share` of their price, as in a batch. A stated charge is what was
     /// charged in all.
     #[must_use]
-    pub(crate) fn charged_in_part(&self, usage: Usage, share: f64) -> f64 {
+    pub fn charged_in_part(&self, usage: Usage, share: f64) -> f64 {
         let list = share * self.list_charge(usage);
         stated_charge(usage, list).unwrap_or(list)
     }
@@ -71,7 +71,7 @@ impl Price {
     /// Price of the tokens of a request at its service tier, in US dollars. A token count that the server did not
     /// report counts as 0.
     #[must_use]
-    pub(crate) fn list_charge(&self, usage: Usage) -> f64 {
+    pub fn list_charge(&self, usage: Usage) -> f64 {
         let prompt = tokens_or_zero(usage.prompt_tokens);
         let reply = tokens_or_zero(usage.completion_tokens);
         let cached = tokens_or_zero(usage.cached_tokens).min(prompt);
@@ -81,7 +81,8 @@ impl Price {
     }
 
     /// The same price, as that of the service tier that is asked for, whatever its name.
-    pub(crate) fn as_asked(self, tier: Option<&str>) -> Self {
+    #[must_use]
+    pub fn as_asked(self, tier: Option<&str>) -> Self {
         let kind = tier.and_then(ServiceTier::from_name);
         Self { tiers: self.tiers.relative_to(kind, 1.0), ..self }
     }
@@ -99,7 +100,7 @@ impl Price {
 
 /// The charge that the server states for a request whose tokens cost `list`, both in US dollars; `None` if it states
 /// none, or one that is no plausible price of these tokens.
-pub(crate) fn stated_charge(usage: Usage, list: f64) -> Option<f64> {
+pub fn stated_charge(usage: Usage, list: f64) -> Option<f64> {
     let stated = usage.cost?.dollars();
     let is_plausible = list <= 0.0 || (list / MAX_RATIO..=list * MAX_RATIO).contains(&stated);
     is_plausible.then_some(stated)
@@ -112,7 +113,7 @@ fn tokens_or_zero(tokens: Option<u64>) -> f64 {
 /// A dated table of prices by model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub(crate) struct Prices {
+pub struct Prices {
     /// Date of the prices.
     pub as_of: String,
     /// Price in the Batch API, as a share of the normal price.
@@ -134,7 +135,7 @@ impl Prices {
     ///
     /// # Errors
     /// Never in practice: a test parses the table.
-    pub(crate) fn built_in() -> Result<Self> {
+    pub fn built_in() -> Result<Self> {
         toml::from_str(include_str!("../prices.toml")).map_err(|e| Error::usage("src/ask/prices.toml", e.message()))
     }
 
@@ -142,7 +143,7 @@ impl Prices {
     ///
     /// # Errors
     /// If the file cannot be read or parsed, or a price or the batch share is negative or not finite.
-    pub(crate) fn load(path: &Path) -> Result<Self> {
+    pub fn load(path: &Path) -> Result<Self> {
         let text = files::settings(path)?;
         let prices: Self = toml::from_str(&text).map_err(|e| {
             let TomlFault { line, problem } = TomlFault::new(&text, &e);
@@ -165,10 +166,10 @@ impl Prices {
     }
 
     /// Key of a custom table in the settings of a manifest.
-    pub(crate) const SETTING: &str = "prices";
+    pub const SETTING: &str = "prices";
 
     /// The table in the form of a manifest; `None` for the built-in table.
-    pub(crate) fn setting(&self) -> Option<Value> {
+    pub fn setting(&self) -> Option<Value> {
         self.is_custom.then(|| serde_json::json!(self))
     }
 
@@ -176,7 +177,7 @@ impl Prices {
     ///
     /// # Errors
     /// If the table in the settings cannot be parsed.
-    pub(crate) fn from_settings(settings: &BTreeMap<String, Value>) -> Result<Self> {
+    pub fn from_settings(settings: &BTreeMap<String, Value>) -> Result<Self> {
         let Some(stored) = settings.get(Self::SETTING) else {
             return Self::built_in();
         };
@@ -186,14 +187,14 @@ impl Prices {
     }
 
     /// Source of the prices, as a phrase that follows "at".
-    pub(crate) fn source(&self) -> String {
+    pub fn source(&self) -> String {
         let date = &self.as_of;
         if self.is_custom { format!("the prices of {date} of --prices") } else { format!("the list prices of {date}") }
     }
 
     /// Finds the price of a model at the standard tier; `None` if the table does not state it.
     #[must_use]
-    pub(crate) fn find(&self, model: &str) -> Option<Price> {
+    pub fn find(&self, model: &str) -> Option<Price> {
         self.price(model, None).ok()
     }
 
@@ -203,7 +204,7 @@ impl Prices {
     ///
     /// # Errors
     /// The reason why the table has no such price.
-    pub(crate) fn price(&self, model: &str, tier: Option<&str>) -> std::result::Result<Price, Unpriced> {
+    pub fn price(&self, model: &str, tier: Option<&str>) -> std::result::Result<Price, Unpriced> {
         let bare = model.rsplit('/').next().unwrap_or(model);
         let mut reason = Unpriced::Model;
         for name in [model, bare] {
@@ -260,7 +261,7 @@ impl Prices {
 
 /// The reason why a table has no price of a model.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Unpriced {
+pub enum Unpriced {
     /// The model is not in the table.
     Model,
     /// The table has the price of `alias`, and does not say that this version costs the same.
@@ -271,7 +272,7 @@ pub(crate) enum Unpriced {
 
 impl Unpriced {
     /// The reason with the remedy, for a model and a table of this date.
-    pub(crate) fn words(&self, model: &str, as_of: &str) -> String {
+    pub fn words(&self, model: &str, as_of: &str) -> String {
         match self {
             Self::Model => format!(
                 "the price of {model} is not in the table of {as_of}; add it to your own table and name that with --prices FILE, or set \
@@ -313,7 +314,7 @@ fn version_of<'n>(name: &'n str, model: &str) -> Option<&'n str> {
 
 /// Factor of each service tier relative to the price that it belongs to; `None` if unknown.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct TierFactors([Option<f64>; ServiceTier::COUNT]);
+pub struct TierFactors([Option<f64>; ServiceTier::COUNT]);
 
 impl Default for TierFactors {
     fn default() -> Self {
@@ -352,22 +353,22 @@ impl TierFactors {
     }
 
     /// True if a reply states a tier whose factor is unknown.
-    pub(crate) fn is_unknown(&self, tier: ServiceTier) -> bool {
+    pub fn is_unknown(&self, tier: ServiceTier) -> bool {
         self.0[tier as usize].is_none()
     }
 }
 
 /// Upper bound on the tokens of one request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct TokenBound {
-    pub(crate) prompt: u64,
+pub struct TokenBound {
+    pub prompt: u64,
     /// Tokens of the reply, hidden reasoning included.
-    pub(crate) reply: u64,
+    pub reply: u64,
 }
 
 impl TokenBound {
     /// Returns the bound as the unreported tokens of one request.
-    pub(crate) fn unstated(self) -> Unstated {
+    pub fn unstated(self) -> Unstated {
         Unstated { requests: 1, prompt_tokens: self.prompt, completion_tokens: self.reply }
     }
 
@@ -375,7 +376,8 @@ impl TokenBound {
     ///
     /// Nothing is missing if the server states what it charges. Without prompt tokens (absent or 0), the server does
     /// not count tokens: 0 reply tokens are then also missing.
-    pub(crate) fn missing_from(self, usage: Usage) -> Self {
+    #[must_use]
+    pub fn missing_from(self, usage: Usage) -> Self {
         if usage.cost.is_some_and(|cost| cost.dollars() > 0.0) {
             return Self::default();
         }
@@ -391,7 +393,7 @@ impl TokenBound {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::StatedCost;
+    use darkqa_base::types::StatedCost;
 
     #[test]
     fn the_built_in_table_is_complete() {

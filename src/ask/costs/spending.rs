@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::Notify;
 
 use super::prices::{Price, TokenBound, stated_charge};
-use crate::types::{LostAttempts, ServiceTier, Usage};
+use darkqa_base::types::{LostAttempts, ServiceTier, Usage};
 
 /// Tolerance of the limit for rounding errors, as a share of the limit.
 const TOLERANCE: f64 = 1e-9;
@@ -21,7 +21,7 @@ const EXCESS_FACTOR: u64 = 4;
 
 /// Charge for one request.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Charge {
+pub enum Charge {
     /// Nothing: the request was refused or never sent.
     Nothing,
     /// The tokens that the server reported.
@@ -32,7 +32,7 @@ pub(crate) enum Charge {
 
 /// Statistics of the replies of a model that were charged more tokens than their token limit.
 #[derive(Debug, Default)]
-pub(crate) struct ReplyExcess {
+pub struct ReplyExcess {
     /// Tokens of the longest such reply; 0 without one.
     longest: AtomicU64,
     /// Maximum number of tokens beyond the limit.
@@ -49,12 +49,12 @@ impl ReplyExcess {
     }
 
     /// Tokens of the longest reply beyond its limit; 0 without one.
-    pub(crate) fn longest(&self) -> u64 {
+    pub fn longest(&self) -> u64 {
         self.longest.load(Ordering::Relaxed)
     }
 
     /// Number of replies beyond their limit.
-    pub(crate) fn replies(&self) -> u64 {
+    pub fn replies(&self) -> u64 {
         self.replies.load(Ordering::Relaxed)
     }
 
@@ -67,7 +67,7 @@ impl ReplyExcess {
 
 /// US dollars spent and reserved, and the limit of their sum.
 #[derive(Debug)]
-pub(crate) struct Spending {
+pub struct Spending {
     /// Limit in US dollars; `None` for no limit.
     limit: Option<f64>,
     /// Maximum cost in US dollars of batches that have not ended.
@@ -106,24 +106,24 @@ impl Dollars {
 
 /// Price and token bound of a request to reserve money for.
 #[derive(Debug, Clone)]
-pub(crate) struct PricedRequest {
-    pub(crate) price: Price,
-    pub(crate) bound: TokenBound,
+pub struct PricedRequest {
+    pub price: Price,
+    pub bound: TokenBound,
     /// Replies of the model beyond their token limit.
-    pub(crate) excess: Arc<ReplyExcess>,
+    pub excess: Arc<ReplyExcess>,
     /// Charges that the model's server states.
-    pub(crate) charges: Arc<ChargeRatios>,
+    pub charges: Arc<ChargeRatios>,
 }
 
 impl PricedRequest {
     /// Token bound; the bound of the reply is higher if the server has exceeded a token limit before.
-    pub(crate) fn current_bound(&self) -> TokenBound {
+    pub fn current_bound(&self) -> TokenBound {
         TokenBound { reply: self.excess.bound(self.bound.reply), ..self.bound }
     }
 
     /// Maximum cost of the request, in US dollars: at the price table, or as much dearer as the server has charged
     /// before.
-    pub(crate) fn max_cost(&self) -> f64 {
+    pub fn max_cost(&self) -> f64 {
         self.max_cost_within(self.current_bound())
     }
 
@@ -134,7 +134,7 @@ impl PricedRequest {
 
 impl Spending {
     /// Creates the spending of a run with an optional limit, of which `spent` is already spent; both in US dollars.
-    pub(crate) fn new(limit: Option<f64>, spent: f64) -> Self {
+    pub fn new(limit: Option<f64>, spent: f64) -> Self {
         Self {
             limit,
             pending_batches: 0.0,
@@ -144,12 +144,13 @@ impl Spending {
     }
 
     /// Sets the maximum cost, in US dollars, of batches that have not ended.
-    pub(crate) fn with_pending_batches(self, pending_batches: f64) -> Self {
+    #[must_use]
+    pub fn with_pending_batches(self, pending_batches: f64) -> Self {
         Self { pending_batches, ..self }
     }
 
     /// Limit in US dollars; `None` for no limit.
-    pub(crate) fn limit(&self) -> Option<f64> {
+    pub fn limit(&self) -> Option<f64> {
         self.limit
     }
 
@@ -160,28 +161,28 @@ impl Spending {
     }
 
     /// US dollars spent so far.
-    pub(crate) fn spent(&self) -> f64 {
+    pub fn spent(&self) -> f64 {
         self.dollars().spent
     }
 
     /// Adds a charge for which nothing was reserved, in US dollars.
-    pub(crate) fn add(&self, charged: f64) {
+    pub fn add(&self, charged: f64) {
         self.dollars().spent += charged;
     }
 
     /// US dollars reserved for requests that have not ended.
-    pub(crate) fn reserved(&self) -> f64 {
+    pub fn reserved(&self) -> f64 {
         self.dollars().reserved
     }
 
     /// US dollars spent beyond the limit; 0 within the limit.
-    pub(crate) fn overrun(&self) -> f64 {
+    pub fn overrun(&self) -> f64 {
         let over = self.limit.map_or(0.0, |limit| self.spent() - limit);
         if over > self.limit.unwrap_or(0.0) * TOLERANCE { over } else { 0.0 }
     }
 
     /// Reserves the maximum cost of a request; `None` if the limit does not allow it.
-    pub(crate) fn reserve(self: &Arc<Self>, request: PricedRequest) -> Option<Reservation> {
+    pub fn reserve(self: &Arc<Self>, request: PricedRequest) -> Option<Reservation> {
         let bound = request.current_bound();
         let max_cost = request.max_cost_within(bound);
         let mut dollars = self.dollars();
@@ -198,7 +199,7 @@ impl Spending {
     }
 
     /// Waits until the reserved sum decreases.
-    pub(crate) async fn released(&self) {
+    pub async fn released(&self) {
         self.released.notified().await;
     }
 
@@ -209,7 +210,7 @@ impl Spending {
 
 /// Money reserved for one question: for one request at a time, including its retries.
 #[derive(Debug)]
-pub(crate) struct Reservation {
+pub struct Reservation {
     spending: Arc<Spending>,
     request: PricedRequest,
     attempts: Mutex<Attempts>,
@@ -236,7 +237,7 @@ enum Held {
 impl Reservation {
     /// Reserves the maximum cost of the next request, unless it is already reserved. If the limit does not allow it,
     /// waits for other requests to end; false if there are none.
-    pub(crate) async fn reserve(&self) -> bool {
+    pub async fn reserve(&self) -> bool {
         let mut waiting = None;
         loop {
             let released = self.spending.released.notified();
@@ -269,7 +270,7 @@ impl Reservation {
     }
 
     /// Records that the request is sent, so that it may be charged.
-    pub(crate) fn mark_sent(&self) {
+    pub fn mark_sent(&self) {
         let mut attempts = self.attempts();
         if let Held::Reserved(bound, dollars) = attempts.held {
             attempts.held = Held::Sent(bound, dollars);
@@ -277,7 +278,7 @@ impl Reservation {
     }
 
     /// Replaces the reservation of the sent request by its charge.
-    pub(crate) fn settle(&self, charge: Charge) {
+    pub fn settle(&self, charge: Charge) {
         let mut attempts = self.attempts();
         let Held::Sent(bound, reserved) = attempts.held else {
             return;
@@ -305,7 +306,7 @@ impl Reservation {
     }
 
     /// Ends the reservation, and returns all requests that were or may have been charged, including one in flight.
-    pub(crate) fn charged(&self) -> LostAttempts {
+    pub fn charged(&self) -> LostAttempts {
         self.settle(Charge::Unknown);
         self.attempts().charged
     }
@@ -358,14 +359,14 @@ const MAX_VARYING: f64 = 10.0;
 
 /// A charge that a server states, and the price of its tokens by the table; in US dollars.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct StatedAndListed {
-    pub(crate) stated: f64,
-    pub(crate) listed: f64,
+pub struct StatedAndListed {
+    pub stated: f64,
+    pub listed: f64,
 }
 
 /// Ratios of the charges that a server states for a model to the price table.
 #[derive(Debug, Default)]
-pub(crate) struct ChargeRatios(Mutex<Ratios>);
+pub struct ChargeRatios(Mutex<Ratios>);
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Ratios {
@@ -383,7 +384,7 @@ struct Ratios {
 
 impl ChargeRatios {
     /// Adds the charge of a request whose tokens cost a `share` of their price.
-    pub(crate) fn record(&self, price: Price, usage: Usage, share: f64) {
+    pub fn record(&self, price: Price, usage: Usage, share: f64) {
         let listed = share * price.list_charge(usage);
         let mut ratios = self.lock();
         if let Some(tier) = usage.service_tier.filter(|tier| price.tiers.is_unknown(*tier)) {
@@ -409,7 +410,7 @@ impl ChargeRatios {
     }
 
     /// Factor by which the upper bound of the next request exceeds its list price; at least 1.
-    pub(crate) fn factor(&self) -> f64 {
+    pub fn factor(&self) -> f64 {
         let Some((lowest, highest)) = self.lock().range else {
             return 1.0;
         };
@@ -419,23 +420,23 @@ impl ChargeRatios {
     }
 
     /// Mean ratio of the stated charges to the list price; `None` without a stated charge.
-    pub(crate) fn mean(&self) -> Option<f64> {
+    pub fn mean(&self) -> Option<f64> {
         let (stated, listed) = self.lock().sums;
         (listed > 0.0).then(|| stated / listed)
     }
 
     /// The first stated charge that differs from the price table by more than [`RATIO_TOLERANCE`].
-    pub(crate) fn differing(&self) -> Option<StatedAndListed> {
+    pub fn differing(&self) -> Option<StatedAndListed> {
         self.lock().differing
     }
 
     /// The first stated charge that is no plausible price of its tokens.
-    pub(crate) fn implausible(&self) -> Option<StatedAndListed> {
+    pub fn implausible(&self) -> Option<StatedAndListed> {
         self.lock().implausible
     }
 
     /// True if a reply was at a service tier without a known price.
-    pub(crate) fn has_unknown_tier(&self) -> bool {
+    pub fn has_unknown_tier(&self) -> bool {
         self.lock().unknown_tier.is_some()
     }
 
@@ -447,8 +448,8 @@ impl ChargeRatios {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ask::costs::prices::TierFactors;
-    use crate::types::StatedCost;
+    use crate::costs::prices::TierFactors;
+    use darkqa_base::types::StatedCost;
 
     /// A request that costs up to 100 dollars: a prompt of 10 tokens, and a reply of 90.
     fn request() -> PricedRequest {
@@ -605,7 +606,7 @@ mod tests {
             output: 0.0,
             cached_input: None,
             image_tokens: None,
-            tiers: crate::ask::costs::TierFactors::default(),
+            tiers: crate::costs::TierFactors::default(),
         }
     }
 

@@ -23,11 +23,11 @@ use rustls_platform_verifier::Verifier;
 use tracing::warn;
 
 use super::url::{BaseUrl, CustomHeaders};
-use crate::ask::secrets::{KeyHeader, Scrub, Secret};
-use crate::ask::vendors::Vendor;
-use crate::ask::wire_kind::Wire;
-use crate::error::{Error, Result};
-use crate::files;
+use crate::secrets::{KeyHeader, Scrub, Secret};
+use crate::vendors::Vendor;
+use crate::wire_kind::Wire;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
 
 /// Maximum time to open a connection; chosen.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
@@ -196,7 +196,7 @@ pub(super) fn with_causes(error: &reqwest::Error) -> String {
 /// The key of an endpoint. If it comes from a file, the file is read again after a refusal with status 401: tokens of
 /// cloud accounts are valid for an hour, and keys are rotated.
 #[derive(Debug)]
-pub(crate) struct AccountKey {
+pub(super) struct AccountKey {
     access: Access,
     state: Mutex<AccessState>,
 }
@@ -213,8 +213,8 @@ struct AccessState {
 
 /// Headers of a request, with the key that they carry.
 #[derive(Debug)]
-pub(crate) struct KeyedHeaders {
-    pub(crate) headers: HeaderMap,
+pub(super) struct KeyedHeaders {
+    pub headers: HeaderMap,
     /// Number of the key.
     renewals: u32,
 }

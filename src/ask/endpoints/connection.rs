@@ -22,13 +22,13 @@ use tokio::time::{Instant, timeout};
 
 use super::access::{Access, AccountKey, KeyedHeaders, connect_timeout, with_causes};
 use super::url::{BaseUrl, proxy_variable};
-use crate::ask::bounded_json::parse;
-use crate::ask::failures::{AskError, LONG_SILENCE, Reach, Retry, Unfinished};
-use crate::ask::requests::{Parameters, RequestBody};
-use crate::ask::secrets::Scrub;
-use crate::error::Result;
-use crate::files;
-use crate::types::FailureKind;
+use crate::bounded_json::parse;
+use crate::failures::{AskError, LONG_SILENCE, Reach, Retry, Unfinished};
+use crate::requests::{Parameters, RequestBody};
+use crate::secrets::Scrub;
+use darkqa_base::error::Result;
+use darkqa_base::files;
+use darkqa_base::types::FailureKind;
 
 /// Maximum size of a decompressed response, in bytes; chosen. A reply of a few tokens is far smaller, and a server must
 /// not exhaust the memory.
@@ -109,7 +109,7 @@ enum ReachedLimit {
 /// Pooled connections to a server, and its key.
 #[derive(Debug, Clone)]
 pub(crate) struct Connection {
-    pub(crate) base: BaseUrl,
+    pub base: BaseUrl,
     /// The key, and the filter that removes it.
     key: Arc<AccountKey>,
     client: Client,
@@ -122,9 +122,9 @@ pub(crate) struct Connection {
 
 /// Response to one request.
 pub(crate) struct HttpResponse {
-    pub(crate) status: StatusCode,
-    pub(crate) headers: HeaderMap,
-    pub(crate) body: Vec<u8>,
+    pub status: StatusCode,
+    pub headers: HeaderMap,
+    pub body: Vec<u8>,
     /// Time from sending the request to the last byte of the response.
     pub(super) duration: Duration,
 }
@@ -553,7 +553,7 @@ impl RunningLimit {
 }
 
 /// Sleeps for a running time; suspensions of the process do not count.
-pub(crate) async fn sleep_running(time: Duration) {
+pub async fn sleep_running(time: Duration) {
     let _ = RunningLimit::new(time).run(std::future::pending::<()>()).await;
 }
 

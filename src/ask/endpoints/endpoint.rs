@@ -17,16 +17,16 @@ use super::access::Access;
 use super::load_balancer::{Failover, LoadBalancer, ModelIndex, Sending};
 use super::replica::Replica;
 use super::url::BaseUrl;
-use crate::ask::batch_api::BatchServer;
-use crate::ask::costs::{Charge, Reservation};
-use crate::ask::failures::{AskError, Reach, Retry, Unfinished};
-use crate::ask::pace::{Gate, HeldBack, Quota, RateLimits};
-use crate::ask::requests::Request;
-use crate::ask::vendors::Vendor;
-use crate::ask::wire_kind::Wire;
-use crate::error::{Error, Result};
-use crate::types::text::counted;
-use crate::types::{FailureKind, LostAttempts, Reply};
+use crate::batch_api::BatchServer;
+use crate::costs::{Charge, Reservation};
+use crate::failures::{AskError, Reach, Retry, Unfinished};
+use crate::pace::{Gate, HeldBack, Quota, RateLimits};
+use crate::requests::Request;
+use crate::vendors::Vendor;
+use crate::wire_kind::Wire;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{FailureKind, LostAttempts, Reply};
 
 /// Maximum wait between retries if the server does not ask for one; chosen. A server may ask for longer waits.
 const MAX_DELAY: Duration = Duration::from_secs(30);
@@ -111,13 +111,13 @@ impl Endpoint {
     }
 
     /// Adds a model with this id. Its state at the replicas is separate from that of other models.
-    pub(crate) fn add_model(&self, id: &str) -> ModelIndex {
+    pub fn add_model(&self, id: &str) -> ModelIndex {
         self.load_balancer.add_model(id.to_owned())
     }
 
     /// Maximum number of requests in flight at the moment, at all replicas that accept this model, within
     /// [`Sending::concurrency`].
-    pub(crate) fn width(&self, model: ModelIndex) -> usize {
+    pub fn width(&self, model: ModelIndex) -> usize {
         let width: usize = self.accepting_replicas(model).map(Replica::width).sum();
         width.max(1)
     }
@@ -138,21 +138,21 @@ impl Endpoint {
     }
 
     /// Vendor of the first replica; `None` if no table lists its host.
-    pub(crate) fn vendor(&self) -> Option<&'static Vendor> {
+    pub fn vendor(&self) -> Option<&'static Vendor> {
         self.replicas[0].vendor()
     }
 
-    pub(crate) fn has_key(&self) -> bool {
+    pub fn has_key(&self) -> bool {
         self.replicas[0].has_key()
     }
 
     /// Maximum number of retries of a question after charged requests without a reply.
-    pub(crate) fn paid_retries(&self) -> u32 {
+    pub fn paid_retries(&self) -> u32 {
         self.sending.paid_retries
     }
 
     /// Time for which requests had to wait for their turn so far.
-    pub(crate) fn held_back(&self) -> HeldBack {
+    pub fn held_back(&self) -> HeldBack {
         self.replicas
             .iter()
             .map(|replica| &replica.gate)
@@ -162,7 +162,7 @@ impl Endpoint {
     }
 
     /// Headers of every request through this API, for each replica.
-    pub(crate) fn headers(&self, wire: Wire) -> Result<Vec<HeaderMap>> {
+    pub fn headers(&self, wire: Wire) -> Result<Vec<HeaderMap>> {
         self.replicas.iter().map(|replica| replica.headers(wire)).collect()
     }
 
@@ -170,7 +170,7 @@ impl Endpoint {
     ///
     /// # Errors
     /// If a header value has characters that HTTP does not allow.
-    pub(crate) fn batch_server(&self) -> Result<BatchServer> {
+    pub fn batch_server(&self) -> Result<BatchServer> {
         let first = &self.replicas[0];
         let headers = first.headers(Wire::Chat)?;
         let connection = first.connection.clone();
@@ -181,7 +181,7 @@ impl Endpoint {
     ///
     /// # Errors
     /// If a header value has characters that HTTP does not allow.
-    pub(crate) fn shares_account_with(&self, other: &Self) -> Result<bool> {
+    pub fn shares_account_with(&self, other: &Self) -> Result<bool> {
         let (own, other) = (&self.replicas[0], &other.replicas[0]);
         let is_same_base = own.base() == other.base();
         Ok(is_same_base && own.headers(Wire::Chat)? == other.headers(Wire::Chat)?)
@@ -213,7 +213,7 @@ impl Endpoint {
 
     /// Sends a request, with retries after temporary failures. While the endpoint accepts no requests, the request
     /// waits without using a retry, for at most [`Sending::patience`]. The future may be dropped at any time.
-    pub(crate) async fn ask(&self, request: &Request<'_>) -> Result<Reply, AskError> {
+    pub async fn ask(&self, request: &Request<'_>) -> Result<Reply, AskError> {
         if self.replicas.len() > 1 {
             self.compared(&request.sent.parameters.model)
                 .get_or_init(|| async {
@@ -433,7 +433,7 @@ impl Endpoint {
     }
 
     /// Waits before a question is asked again whose reply does not count, at most until the endpoint is closed.
-    pub(crate) async fn wait_to_ask_again(&self) {
+    pub async fn wait_to_ask_again(&self) {
         self.sleep_unless_closed(self.sending.first_delay).await;
     }
 
@@ -578,7 +578,7 @@ impl QuestionAttempts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::FailureKind;
+    use darkqa_base::types::FailureKind;
 
     fn timeout() -> AskError {
         AskError::new(FailureKind::Server, "504".to_owned()).with_unfinished(Unfinished::QuickTimeout)

@@ -13,10 +13,10 @@ use clap::Args;
 use tokio::time::Instant;
 use tracing::warn;
 
-use crate::ask::failures::{AskError, Reach, Retry};
-use crate::ask::pace::{ConcurrencyBounds, Quota};
-use crate::types::flags::{positive, seconds};
-use crate::types::{Decides, FailureKind};
+use crate::failures::{AskError, Reach, Retry};
+use crate::pace::{ConcurrencyBounds, Quota};
+use darkqa_base::types::flags::{positive, seconds};
+use darkqa_base::types::{Decides, FailureKind};
 
 /// A request goes to its preferred replica if that has at most this many more requests in flight than the least loaded
 /// one; chosen. Questions about one image then share a prefix cache.
@@ -46,7 +46,7 @@ pub(super) struct LoadBalancer(Mutex<State>);
 /// Index of a model among the models opened at an endpoint. Two models may have the same id and different settings, and
 /// so different refusals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct ModelIndex(usize);
+pub struct ModelIndex(usize);
 
 #[derive(Debug)]
 struct State {

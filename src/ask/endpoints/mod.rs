@@ -16,5 +16,5 @@ pub use url::BaseUrl;
 pub(super) use connection::{Connection, Deadline, HttpResponse};
 pub(super) use load_balancer::ModelIndex;
 
-pub(crate) use connection::sleep_running;
-pub(crate) use server::{AccessArgs, OPENAI_KEY, Server, vendor_variables};
+pub use connection::sleep_running;
+pub use server::{AccessArgs, OPENAI_KEY, Server, vendor_variables};

@@ -12,17 +12,17 @@ use super::access::Access;
 use super::connection::{Connection, Deadline, HttpResponse};
 use super::load_balancer::Sending;
 use super::url::BaseUrl;
-use crate::ask::failures::{
+use crate::failures::{
     ApiError, AskError, Reach, Refusal, ReplyError, Retry, Unfinished, Unreadable, implied_status, is_out_of_tokens,
 };
-use crate::ask::pace::{Gate, RateLimits, Window, retry_after};
-use crate::ask::requests::Request;
-use crate::ask::secrets::without_secrets;
-use crate::ask::vendors::Vendor;
-use crate::ask::wire::{body_usage, cost_in_headers, with_cost};
-use crate::ask::wire_kind::Wire;
-use crate::error::Result;
-use crate::types::{FailureKind, Reply};
+use crate::pace::{Gate, RateLimits, Window, retry_after};
+use crate::requests::Request;
+use crate::secrets::without_secrets;
+use crate::vendors::Vendor;
+use crate::wire::{body_usage, cost_in_headers, with_cost};
+use crate::wire_kind::Wire;
+use darkqa_base::error::Result;
+use darkqa_base::types::{FailureKind, Reply};
 
 /// One address of an endpoint, with its key, pooled connections, rate limiter and concurrency window.
 #[derive(Debug)]

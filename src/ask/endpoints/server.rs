@@ -10,10 +10,10 @@ use super::BaseUrl;
 use super::access::{Access, Authorities};
 use super::load_balancer::Sending;
 use super::url::{CustomHeaders, variable};
-use crate::ask::secrets::{KeyHeader, Secret, looks_like_key};
-use crate::ask::vendors::{Vendor, VendorTable};
-use crate::error::{Error, Result};
-use crate::types::Decides;
+use crate::secrets::{KeyHeader, Secret, looks_like_key};
+use crate::vendors::{Vendor, VendorTable};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Decides;
 
 /// Base URL if neither `--base-url` nor `OPENAI_BASE_URL` is set.
 const DEFAULT_BASE_URL: &str = "https://api.openai.com/v1";
@@ -22,7 +22,7 @@ const DEFAULT_BASE_URL: &str = "https://api.openai.com/v1";
 const BASE_URL_VARIABLE: &str = "OPENAI_BASE_URL";
 
 /// Variable with the key of endpoints that are not in the table of vendors.
-pub(crate) const OPENAI_KEY: &str = "OPENAI_API_KEY";
+pub const OPENAI_KEY: &str = "OPENAI_API_KEY";
 
 /// Value of `--api-key-env` for an endpoint without keys.
 const NO_KEY: &str = "none";
@@ -33,7 +33,7 @@ const NO_KEY: &str = "none";
 /// one, with its password.
 #[derive(Debug, Clone, Default, PartialEq, Args)]
 #[command(next_help_heading = "Model")]
-pub(crate) struct AccessArgs {
+pub struct AccessArgs {
     /// Endpoint; /chat/completions is appended; repeatable for replicas of one server; default: OPENAI_BASE_URL, else
     /// OpenAI's
     #[arg(long, value_name = "URL", add = Decides::Reply)]
@@ -71,7 +71,7 @@ pub(crate) struct AccessArgs {
 
 /// Replicas of a server, and the settings for sending requests to it.
 #[derive(Debug, Clone)]
-pub(crate) struct Server {
+pub struct Server {
     /// Address, key and certificates of each replica; at least one.
     pub replicas: Vec<Access>,
     /// Timeouts, retries and rate limits of requests.
@@ -80,13 +80,13 @@ pub(crate) struct Server {
 
 impl Server {
     /// Maximum number of requests in flight, at all replicas together.
-    pub(crate) fn max_in_flight(&self) -> usize {
+    pub fn max_in_flight(&self) -> usize {
         let replicas = self.replicas.len();
         self.sending.concurrency.per_replica(replicas).max() * replicas
     }
 
     /// Addresses of all replicas, without secrets.
-    pub(crate) fn addresses(&self) -> Vec<String> {
+    pub fn addresses(&self) -> Vec<String> {
         self.replicas.iter().map(|replica| replica.base.to_string()).collect()
     }
 }
@@ -94,13 +94,13 @@ impl Server {
 impl AccessArgs {
     /// The same endpoint, without any key.
     #[must_use]
-    pub(crate) fn without_key(&self) -> Self {
+    pub fn without_key(&self) -> Self {
         Self { api_key_env: Some(NO_KEY.to_owned()), api_key_file: None, header_env: Vec::new(), ..self.clone() }
     }
 
     /// Flags for another endpoint: without the key and the headers of this one.
     #[must_use]
-    pub(crate) fn for_base_url(&self, base_url: String) -> Self {
+    pub fn for_base_url(&self, base_url: String) -> Self {
         Self {
             base_url: vec![base_url],
             ca_file: self.ca_file.clone(),
@@ -115,7 +115,7 @@ impl AccessArgs {
     ///
     /// # Errors
     /// If an address is not valid or occurs twice, or a key, header or certificate cannot be read or must not be sent.
-    pub(crate) fn server(&self, sending: Sending) -> Result<Server> {
+    pub fn server(&self, sending: Sending) -> Result<Server> {
         let authorities = self.ca_file.as_deref().map(Authorities::load).transpose()?;
         let authorities = authorities.unwrap_or_default();
         let vendors = self.vendors()?;
@@ -162,7 +162,7 @@ impl AccessArgs {
     ///
     /// # Errors
     /// If an address is not valid.
-    pub(crate) fn addresses(&self) -> Result<Vec<BaseUrl>> {
+    pub fn addresses(&self) -> Result<Vec<BaseUrl>> {
         if self.base_url.is_empty() {
             let named = variable(BASE_URL_VARIABLE);
             return Ok(vec![named.as_deref().unwrap_or(DEFAULT_BASE_URL).parse()?]);
@@ -171,7 +171,7 @@ impl AccessArgs {
     }
 
     /// Description of the source of the key, without the key.
-    pub(crate) fn key_source(&self, replica: &Access) -> String {
+    pub fn key_source(&self, replica: &Access) -> String {
         if let Some(path) = &self.api_key_file {
             return format!("the file {}", path.display());
         }
@@ -191,7 +191,7 @@ impl AccessArgs {
     ///
     /// # Errors
     /// If a key or a custom header would be sent.
-    pub(crate) fn check_run_address(&self, base: &BaseUrl) -> Result<()> {
+    pub fn check_run_address(&self, base: &BaseUrl) -> Result<()> {
         if Vendor::has_host(base.host()) && !base.is_plain() {
             return Ok(());
         }
@@ -257,7 +257,7 @@ fn key_variables(base: &BaseUrl, vendor: Option<&'static Vendor>) -> Vec<&'stati
 }
 
 /// Environment variables of the tools of a host's vendor; empty if the built-in table does not have the host.
-pub(crate) fn vendor_variables(host: &str) -> Vec<&'static str> {
+pub fn vendor_variables(host: &str) -> Vec<&'static str> {
     Vendor::at_host(host)
         .into_iter()
         .flat_map(|vendor| vendor.key.iter().chain(vendor.account.values()))

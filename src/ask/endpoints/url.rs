@@ -20,9 +20,9 @@ use percent_encoding::percent_decode_str;
 use reqwest::Url;
 use reqwest::header::{HeaderMap, HeaderName, HeaderValue};
 
-use crate::ask::secrets::{is_secret_header, looks_like_key};
-use crate::ask::wire_kind::Wire;
-use crate::error::{Error, Result};
+use crate::secrets::{is_secret_header, looks_like_key};
+use crate::wire_kind::Wire;
+use darkqa_base::error::{Error, Result};
 
 /// The base URL of an endpoint, used exactly as written: no `/v1` is added or assumed.
 #[derive(Clone, PartialEq, Eq)]
@@ -44,7 +44,7 @@ impl BaseUrl {
 
     /// The port, or the default port of the scheme.
     #[must_use]
-    pub(crate) fn port(&self) -> Option<u16> {
+    pub fn port(&self) -> Option<u16> {
         self.0.port_or_known_default()
     }
 
@@ -63,7 +63,7 @@ impl BaseUrl {
     }
 
     /// True if the URL has a path other than `/`.
-    pub(crate) fn has_path(&self) -> bool {
+    pub fn has_path(&self) -> bool {
         !self.0.path().trim_matches('/').is_empty()
     }
 

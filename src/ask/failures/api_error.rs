@@ -11,25 +11,25 @@ use std::time::Duration;
 use regex::Regex;
 use serde_json::{Value, json};
 
-use crate::ask::bounded_json::{parse, parse_start};
-use crate::ask::pace::{wait_in_field, wait_in_words};
-use crate::types::Usage;
+use crate::bounded_json::{parse, parse_start};
+use crate::pace::{wait_in_field, wait_in_words};
+use darkqa_base::types::Usage;
 
 /// Error that a server reports in a response. Secrets are not yet removed.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(crate) struct ApiError {
+pub struct ApiError {
     /// Error text of the server.
-    pub(crate) message: String,
+    pub message: String,
     /// Kind of error, such as `invalid_request_error` or `insufficient_quota`.
     pub(super) kind: Option<String>,
     /// Error code, such as `model_not_found`, or a number as text.
-    pub(crate) code: Option<String>,
+    pub code: Option<String>,
     /// Request field that caused the error.
-    pub(crate) param: Option<String>,
+    pub param: Option<String>,
     /// True if moderation rejected the content of the request, as opposed to the account.
     pub(super) is_moderated: bool,
     /// Wait stated in the error, in a field or in its text.
-    pub(crate) wait: Option<Duration>,
+    pub wait: Option<Duration>,
     /// Ids of the reached limits, such as `GenerateRequestsPerDayPerProject`.
     limits: Vec<String>,
     /// Google's names of the cause, such as `API_KEY_INVALID`.
@@ -78,7 +78,7 @@ const DAILY: [&str; 6] = ["(rpd)", "(tpd)", "perday", "per day", "per-day", "dai
 impl ApiError {
     /// Parses the error at the top level of a body: `error` as an object or text, or the flat shapes of vLLM, FastAPI
     /// and problem+json. `None` if the body has no error.
-    pub(crate) fn from_json(body: &Value) -> Option<Self> {
+    pub fn from_json(body: &Value) -> Option<Self> {
         // Gemini sends a list of one error.
         if let Value::Array(items) = body {
             return items.first().and_then(Self::from_json);
@@ -99,17 +99,17 @@ impl ApiError {
     }
 
     /// Parses the error in the field `error`; flat shapes are ignored.
-    pub(crate) fn in_error(body: &Value) -> Option<Self> {
+    pub fn in_error(body: &Value) -> Option<Self> {
         body.get("error").filter(|error| is_filled(error)).map(Self::from_error)
     }
 
     /// Parses an error by its structure: an object with an error code and words, under any name.
-    pub(crate) fn in_structure(body: &Value) -> Option<Self> {
+    pub fn in_structure(body: &Value) -> Option<Self> {
         find_error(body).as_ref().map(Self::from_error)
     }
 
     /// Parses the value of a field `error`.
-    pub(crate) fn from_error(error: &Value) -> Self {
+    pub fn from_error(error: &Value) -> Self {
         Self::nested(error, MAX_DEPTH)
     }
 
@@ -182,7 +182,7 @@ impl ApiError {
     }
 
     /// Parses the body of a refused request: JSON, an HTML page or plain text.
-    pub(crate) fn from_body(body: &str) -> Self {
+    pub fn from_body(body: &str) -> Self {
         let parsed = parse(body).ok();
         if let Some(found) = parsed.as_ref().and_then(Self::from_json) {
             return found;
@@ -198,12 +198,12 @@ impl ApiError {
     }
 
     /// True if the code or the kind is one of these.
-    pub(crate) fn has_code(&self, codes: &[&str]) -> bool {
+    pub fn has_code(&self, codes: &[&str]) -> bool {
         [&self.code, &self.kind].into_iter().flatten().any(|code| codes.contains(&code.as_str()))
     }
 
     /// True if the message contains one of these lower-case phrases, ignoring case.
-    pub(crate) fn mentions_any(&self, phrases: &[&str]) -> bool {
+    pub fn mentions_any(&self, phrases: &[&str]) -> bool {
         let message = self.message.to_lowercase();
         phrases.iter().any(|phrase| message.contains(phrase))
     }
@@ -243,7 +243,7 @@ impl ApiError {
     }
 
     /// The error code as an HTTP status; `None` unless it is a number from 400 to 599.
-    pub(crate) fn status(&self) -> Option<u16> {
+    pub fn status(&self) -> Option<u16> {
         let status = self.code.as_ref()?.parse().ok()?;
         (400..600).contains(&status).then_some(status)
     }
@@ -266,13 +266,13 @@ pub(crate) enum ReplyError {
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Unreadable {
     /// Description of the body, as a phrase that follows "answered with".
-    pub(crate) description: String,
+    pub description: String,
     /// Tokens charged for it; `None` if the server does not report them.
-    pub(crate) usage: Option<Usage>,
+    pub usage: Option<Usage>,
     /// Finish reason of the server, if it is unknown or means that the reply is incomplete.
-    pub(crate) finish: Option<String>,
+    pub finish: Option<String>,
     /// True if the body has a part of the reply, so that the server has worked on it.
-    pub(crate) broke_off: bool,
+    pub broke_off: bool,
 }
 
 impl Unreadable {

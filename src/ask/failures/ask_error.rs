@@ -7,11 +7,11 @@
 use std::time::Duration;
 
 use super::api_error::ApiError;
-use crate::ask::bounded_json::parse;
-use crate::ask::costs::Charge;
-use crate::ask::requests::AdaptableField;
-use crate::ask::secrets::Scrub;
-use crate::types::{Failure, FailureKind, Finish, LostAttempts, Reply, Usage};
+use crate::bounded_json::parse;
+use crate::costs::Charge;
+use crate::requests::AdaptableField;
+use crate::secrets::Scrub;
+use darkqa_base::types::{Failure, FailureKind, Finish, LostAttempts, Reply, Usage};
 
 /// Requests that a failure affects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,7 +31,7 @@ pub enum Reach {
 
 /// Whether and when to retry a request without a reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Retry {
+pub enum Retry {
     /// Do not retry: the same request would fail again.
     Never,
     /// Retry after a delay; this uses one of `--retries`.
@@ -57,7 +57,7 @@ impl Refusal {
     const CAUSE_WORDS: usize = 6;
 
     /// The refusal with this status, code and words.
-    pub(crate) fn new(status: u16, code: Option<&str>, words: String) -> Self {
+    pub fn new(status: u16, code: Option<&str>, words: String) -> Self {
         // Some servers repeat the status as the code.
         let code = code.filter(|code| *code != status.to_string());
         let cause = code.map_or_else(
@@ -104,28 +104,28 @@ pub struct AskError {
     /// Field that the server refused, if the program can send it in another way.
     pub refused_field: Option<AdaptableField>,
     /// Flags of the settings that the server refused: they may change within the run.
-    pub(crate) forced: &'static [&'static str],
+    pub forced: &'static [&'static str],
     /// Attempts that were charged.
     pub lost: Box<LostAttempts>,
     /// Finish reason of the server, if it is the reason for the missing reply.
     pub finish: Option<Box<str>>,
     /// The refusal, if it may concern the content of this request alone.
     pub refusal: Option<Box<Refusal>>,
-    pub(crate) retry: Retry,
+    pub retry: Retry,
     /// Wait that the server asked for.
-    pub(crate) wait: Option<Duration>,
+    pub wait: Option<Duration>,
     /// True if the request may have had an effect that the server did not report: a charge, a file or a batch.
-    pub(crate) may_have_effect: bool,
+    pub may_have_effect: bool,
     /// Work that the server may have done, and charged, without a statement of tokens.
-    pub(crate) unfinished: Unfinished,
+    pub unfinished: Unfinished,
     /// Refusal of a batch because too many tokens are enqueued; `None` for other reasons.
-    pub(crate) quota: Option<Box<QuotaRefusal>>,
+    pub quota: Option<Box<QuotaRefusal>>,
 }
 
 impl AskError {
     /// Error of one request without an HTTP status, which is not retried and does not affect other requests. It may
     /// have had an effect if it timed out or has a response.
-    pub(crate) fn new(kind: FailureKind, message: String) -> Self {
+    pub fn new(kind: FailureKind, message: String) -> Self {
         Self {
             may_have_effect: matches!(kind, FailureKind::Timeout | FailureKind::Response),
             failure: Failure { kind, status: None, message },
@@ -145,19 +145,21 @@ impl AskError {
 
     /// Error of a question that was abandoned while its request was in flight. The request may be charged; the same
     /// command asks it again.
-    pub(crate) fn given_up() -> Self {
+    pub fn given_up() -> Self {
         let message = "given up while in flight, because the run was interrupted".to_owned();
         Self { reach: Reach::Interrupted, ..Self::new(FailureKind::Timeout, message) }
     }
 
     /// Adds a charged attempt with these tokens.
-    pub(crate) fn with_charge(mut self, usage: Option<Usage>) -> Self {
+    #[must_use]
+    pub fn with_charge(mut self, usage: Option<Usage>) -> Self {
         self.lost.add(usage);
         self
     }
 
     /// The same failure of a request on which the server may have worked.
-    pub(crate) fn with_unfinished(mut self, unfinished: Unfinished) -> Self {
+    #[must_use]
+    pub fn with_unfinished(mut self, unfinished: Unfinished) -> Self {
         if unfinished.is_timeout() {
             self.failure.kind = FailureKind::Timeout;
             self.may_have_effect = true;
@@ -167,7 +169,7 @@ impl AskError {
     }
 
     /// Charge for the request.
-    pub(crate) fn charge(&self) -> Charge {
+    pub fn charge(&self) -> Charge {
         match *self.lost {
             lost if lost.attempts > 0 => Charge::Stated(lost.usage),
             _ if self.may_have_effect => Charge::Unknown,
@@ -176,13 +178,14 @@ impl AskError {
     }
 
     /// Turns the error of the last request into the error of the question, with all its attempts and charges.
-    pub(crate) fn with_attempts(self, attempts: u32, lost: LostAttempts) -> Self {
+    #[must_use]
+    pub fn with_attempts(self, attempts: u32, lost: LostAttempts) -> Self {
         Self { attempts, lost: Box::new(lost), ..self }
     }
 
     /// True if a refusal with this status may concern the content of the request alone: moderation rejected it, or
     /// neither the server's words nor the size of the request explain it. The message must still be the remedy alone.
-    pub(crate) fn may_be_content(&self, status: u16) -> bool {
+    pub fn may_be_content(&self, status: u16) -> bool {
         let is_unexplained = match self.reach {
             Reach::Trial => self.failure.message.is_empty(),
             Reach::ByStatus => true,
@@ -197,7 +200,7 @@ impl AskError {
     ///
     /// # Errors
     /// The error itself, if it is no such refusal.
-    pub(crate) fn into_filtered(mut self) -> Result<Reply, Self> {
+    pub fn into_filtered(mut self) -> Result<Reply, Self> {
         match self.refusal.take() {
             Some(refusal) => Ok(refusal.into_reply(self.attempts, *self.lost)),
             None => Err(self),
@@ -205,25 +208,25 @@ impl AskError {
     }
 
     /// True if the same call of the Files or Batch API would fail again: the key, the address or the request is wrong.
-    pub(crate) fn is_permanent(&self) -> bool {
+    pub fn is_permanent(&self) -> bool {
         let is_temporary = matches!(self.failure.status, None | Some(408 | 409 | 425 | 429 | 500..));
         !is_temporary && self.quota.is_none()
     }
 
     /// True if no connection to the server could be made, so that the request was not sent.
-    pub(crate) fn is_unconnected(&self) -> bool {
+    pub fn is_unconnected(&self) -> bool {
         self.failure.kind == FailureKind::Connection && !self.may_have_effect
     }
 
     /// True if the server does not have the called API.
-    pub(crate) fn is_unsupported(&self) -> bool {
+    pub fn is_unsupported(&self) -> bool {
         matches!(self.failure.status, Some(404 | 405 | 501))
     }
 }
 
 /// Refusal of a batch because too many tokens are already enqueued in batches.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct QuotaRefusal {
+pub struct QuotaRefusal {
     /// Maximum number of enqueued tokens; `None` if the server does not report it.
     pub limit: Option<u64>,
     /// The server's message, without secrets.
@@ -232,7 +235,7 @@ pub(crate) struct QuotaRefusal {
 
 impl QuotaRefusal {
     /// Recognizes such a refusal; `None` for other errors.
-    pub(crate) fn from_api_error(api_error: &ApiError, scrub: &Scrub) -> Option<Self> {
+    pub fn from_api_error(api_error: &ApiError, scrub: &Scrub) -> Option<Self> {
         let is_quota = api_error.has_code(&["token_limit_exceeded"]) || api_error.mentions_any(&["enqueued token"]);
         is_quota.then(|| Self { limit: stated_limit(&api_error.message), message: scrub.line(&api_error.message) })
     }
@@ -264,7 +267,7 @@ const TIMEOUT: [&str; 6] = ["timeout", "time-out", "timed out", "timing out", "t
 
 /// Work that a server may have done, and charged, for a request without a reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum Unfinished {
+pub enum Unfinished {
     /// None that is known of.
     #[default]
     None,
@@ -281,7 +284,7 @@ pub(crate) enum Unfinished {
 
 impl Unfinished {
     /// The work on a request that was refused with this status and body after this time.
-    pub(crate) fn of_refusal(status: u16, took: Duration, api_error: &ApiError, body: &[u8]) -> Self {
+    pub fn of_refusal(status: u16, took: Duration, api_error: &ApiError, body: &[u8]) -> Self {
         let is_failure = status >= 499 || status == 408;
         let states_timeout =
             matches!(status, 408 | 504 | 524 | 598 | 599) || (is_failure && api_error.mentions_any(&TIMEOUT));
@@ -297,12 +300,12 @@ impl Unfinished {
     }
 
     /// True if the request takes longer than a gateway waits.
-    pub(crate) fn is_timeout(self) -> bool {
+    pub fn is_timeout(self) -> bool {
         matches!(self, Self::RepeatedTimeout | Self::GatewayTimeout)
     }
 
     /// True if the server has probably charged the request.
-    pub(crate) fn is_probably_charged(self) -> bool {
+    pub fn is_probably_charged(self) -> bool {
         self == Self::BrokeOff || self.is_timeout()
     }
 }

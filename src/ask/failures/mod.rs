@@ -12,4 +12,4 @@ pub(super) use vocabulary::{Wording, is_moderated, is_out_of_tokens};
 
 pub use ask_error::{AskError, Reach};
 
-pub(crate) use ask_error::QuotaRefusal;
+pub use ask_error::QuotaRefusal;

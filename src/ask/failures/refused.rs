@@ -16,12 +16,12 @@ use regex::Regex;
 use super::api_error::ApiError;
 use super::ask_error::{AskError, Reach, Retry};
 use super::vocabulary::{self, Wording, is_moderated, is_out_of_tokens};
-use crate::ask::requests::{
+use crate::requests::{
     AdaptableField, FieldState, RequestField, SentFields, for_judge, is_unsupported, least_temperature,
 };
-use crate::ask::wire::requested_wire;
-use crate::ask::wire_kind::Wire;
-use crate::types::FailureKind;
+use crate::wire::requested_wire;
+use crate::wire_kind::Wire;
+use darkqa_base::types::FailureKind;
 
 /// Phrases for a request larger than the limit of a whole minute (status 413 or 429): waiting does not help.
 const TOO_LARGE: [&str; 2] = ["request too large", "request is too large"];
@@ -88,7 +88,7 @@ static NO_MODEL: LazyLock<Regex> = LazyLock::new(|| {
 impl AskError {
     /// Classifies a refused request by its status and the server's error. The message is only the remedy; empty if none
     /// is known.
-    pub(crate) fn refused(status: u16, api_error: &ApiError, wire: Wire, sent: SentFields<'_>) -> Self {
+    pub fn refused(status: u16, api_error: &ApiError, wire: Wire, sent: SentFields<'_>) -> Self {
         let mut failed = Self::by_evidence(status, api_error, wire, sent)
             .unwrap_or_else(|| Self::by_status(status, api_error, wire, sent));
         if sent.parameters.origin.is_judge {

@@ -11,8 +11,8 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::ask::failures::AskError;
-use crate::types::{FailureKind, Finish, Reply};
+use crate::failures::AskError;
+use darkqa_base::types::{FailureKind, Finish, Reply};
 
 /// What the second try of a reply showed about its finish reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -117,7 +117,7 @@ fn broken_off(reply: &Reply, word: String) -> AskError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::Usage;
+    use darkqa_base::types::Usage;
 
     fn ended(word: &str, text: &str) -> Reply {
         let finish = match word {

@@ -8,29 +8,29 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use crate::ask::failures::AskError;
-use crate::ask::requests::Call;
-use crate::error::{Error, Result};
-use crate::files;
-use crate::types::questions::letter;
-use crate::types::{Condition, Digest, FailureKind, Finish, Observed, Question, QuestionId, Reply};
+use crate::failures::AskError;
+use crate::requests::Call;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::questions::letter;
+use darkqa_base::types::{Condition, Digest, FailureKind, Finish, Observed, Question, QuestionId, Reply};
 
 /// Finish reason of a reply that is a guess.
 const GUESS: &str = "guess";
 
 /// Answer of the function of a [`Local`] model.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(crate) struct LocalAnswer {
+pub struct LocalAnswer {
     /// Index of the choice; `None` if the function does not know.
-    pub(crate) choice: Option<usize>,
+    pub choice: Option<usize>,
     /// Observation to record; `None` without an image.
-    pub(crate) observed: Option<Observed>,
+    pub observed: Option<Observed>,
     /// True to record the answer as a guess.
-    pub(crate) guessed: bool,
+    pub guessed: bool,
 }
 
 /// A function that answers a question.
-pub(crate) type AnswerFn = dyn Fn(&Question, &Call<'_>) -> Result<LocalAnswer, String> + Send + Sync;
+pub(super) type AnswerFn = dyn Fn(&Question, &Call<'_>) -> Result<LocalAnswer, String> + Send + Sync;
 
 /// Model whose answers come from a function. If the function does not know the answer, [`Random`] guesses: the same
 /// seed, question, condition and turn give the same guess.
@@ -50,7 +50,7 @@ impl fmt::Debug for Local {
 impl Local {
     /// Creates a model; `digest` is the digest of everything that decides the function's answers.
     #[must_use]
-    pub(crate) fn new(name: String, digest: Digest, fallback: Random, answer_fn: Box<AnswerFn>) -> Self {
+    pub fn new(name: String, digest: Digest, fallback: Random, answer_fn: Box<AnswerFn>) -> Self {
         Self { name, digest, fallback, answer_fn }
     }
 
@@ -228,8 +228,8 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::ask::{Message, Query};
-    use crate::types::{Choices, Condition, Evidence, Family, FrameId, QuestionId};
+    use crate::{Message, Query};
+    use darkqa_base::types::{Choices, Condition, Evidence, Family, FrameId, QuestionId};
 
     fn question(id: usize, choices: usize) -> Question {
         let texts = (0..choices).map(|i| format!("choice {i}")).collect();

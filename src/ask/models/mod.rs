@@ -6,7 +6,7 @@ mod model;
 mod remote;
 mod stream_fallback;
 
-pub(crate) use local::{Local, LocalAnswer};
+pub use local::{Local, LocalAnswer};
 
 pub use local::{Random, Script};
 pub use model::Model;

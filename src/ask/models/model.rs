@@ -6,14 +6,14 @@ use serde_json::Value;
 
 use super::local::{Local, Random, Script};
 use super::remote::Remote;
-use crate::ask::batch;
-use crate::ask::batch_api::BatchServer;
-use crate::ask::costs::{Reservation, image_tokens, scaling_image_tokens};
-use crate::ask::failures::AskError;
-use crate::ask::pace::HeldBack;
-use crate::ask::requests::{Call, ChangedSetting, Message, Parameters};
-use crate::error::Result;
-use crate::types::{Digest, Reply};
+use crate::batch;
+use crate::batch_api::BatchServer;
+use crate::costs::{Reservation, image_tokens, scaling_image_tokens};
+use crate::failures::AskError;
+use crate::pace::HeldBack;
+use crate::requests::{Call, ChangedSetting, Message, Parameters};
+use darkqa_base::error::Result;
+use darkqa_base::types::{Digest, Reply};
 
 /// Number of CPU cores that the process may use; `None` if unknown. Counted once, because counting reads files of the
 /// control group.
@@ -104,7 +104,7 @@ impl Model {
     }
 
     /// Time for which requests to the model's endpoint had to wait for their turn so far; zero for built-in models.
-    pub(crate) fn held_back(&self) -> HeldBack {
+    pub fn held_back(&self) -> HeldBack {
         self.remote().map_or_else(HeldBack::default, |model| model.endpoint().held_back())
     }
 
@@ -117,13 +117,13 @@ impl Model {
 
     /// Number of tokens of an image of this width and height, in pixels, if the model has more of them for larger
     /// images; `None` if it does not, or if the number is unknown.
-    pub(crate) fn scaling_image_tokens(&self, width: u64, height: u64) -> Option<u64> {
+    pub fn scaling_image_tokens(&self, width: u64, height: u64) -> Option<u64> {
         let Parameters { model, detail, .. } = self.remote()?.parameters();
         scaling_image_tokens(model, *detail, width, height)
     }
 
     /// Service tier that requests ask for; `None` if they leave it to the server.
-    pub(crate) fn service_tier(&self) -> Option<&str> {
+    pub fn service_tier(&self) -> Option<&str> {
         self.remote()?.parameters().extra.service_tier()
     }
 
@@ -135,40 +135,40 @@ impl Model {
 
     /// Maximum number of charged tokens of a reply, including hidden reasoning; `None` if not all of them are limited.
     /// The server may exceed it.
-    pub(crate) fn reply_limit(&self) -> Option<u64> {
+    pub fn reply_limit(&self) -> Option<u64> {
         self.remote()?.reply_limit()
     }
 
     /// Length of the system message in bytes; 0 without one.
-    pub(crate) fn system_bytes(&self) -> usize {
+    pub fn system_bytes(&self) -> usize {
         self.remote().and_then(|model| model.parameters().extra.system.as_ref()).map_or(0, String::len)
     }
 
     /// Token limit of replies, if the run began with another one.
-    pub(crate) fn changed_limit(&self) -> Option<u32> {
+    pub fn changed_limit(&self) -> Option<u32> {
         self.remote()?.parameters().changed_limit()
     }
 
     /// Token limits of replies: the current one, and the one with which the run began. `None` if none is sent.
-    pub(crate) fn token_limits(&self) -> Option<(u32, u32)> {
+    pub fn token_limits(&self) -> Option<(u32, u32)> {
         let parameters = self.remote()?.parameters();
         Some((parameters.limit()?, parameters.first_limit()))
     }
 
     /// Settings that changed within the run; empty if none did.
-    pub(crate) fn changed_settings(&self) -> &[ChangedSetting] {
+    pub fn changed_settings(&self) -> &[ChangedSetting] {
         self.remote()
             .and_then(|model| model.parameters().origin.continued.as_ref())
             .map_or(&[], |continued| &continued.changes)
     }
 
     /// Flags of the settings that the server refused: they may change within the run.
-    pub(crate) fn forced(&self) -> Vec<&'static str> {
+    pub fn forced(&self) -> Vec<&'static str> {
         self.remote().map_or_else(Vec::new, Remote::forced)
     }
 
     /// True for the judge of open answers.
-    pub(crate) fn is_judge(&self) -> bool {
+    pub fn is_judge(&self) -> bool {
         self.remote().is_some_and(|model| model.parameters().origin.is_judge)
     }
 
@@ -198,12 +198,12 @@ impl Model {
     }
 
     /// Path of the API in the lines of a batch file; `None` for built-in models.
-    pub(crate) fn batch_url(&self) -> Option<&'static str> {
+    pub fn batch_url(&self) -> Option<&'static str> {
         Some(self.remote()?.batch_url())
     }
 
     /// Base URL for files and batches, without secrets; `None` for built-in models.
-    pub(crate) fn batch_base(&self) -> Option<String> {
+    pub fn batch_base(&self) -> Option<String> {
         Some(self.remote()?.endpoint().base().to_string())
     }
 
@@ -211,7 +211,7 @@ impl Model {
     ///
     /// # Errors
     /// If a header value has characters that HTTP does not allow.
-    pub(crate) fn batch_server(&self) -> Result<Option<BatchServer>> {
+    pub fn batch_server(&self) -> Result<Option<BatchServer>> {
         self.remote().map(|model| model.endpoint().batch_server()).transpose()
     }
 
@@ -219,7 +219,7 @@ impl Model {
     ///
     /// # Errors
     /// If a header value has characters that HTTP does not allow.
-    pub(crate) fn shares_account_with(&self, other: &Self) -> Result<bool> {
+    pub fn shares_account_with(&self, other: &Self) -> Result<bool> {
         match (self.remote(), other.remote()) {
             (Some(own), Some(other)) => own.endpoint().shares_account_with(other.endpoint()),
             _ => Ok(false),
@@ -228,13 +228,13 @@ impl Model {
 
     /// Adapts further requests after a refusal in the output of a batch. Returns true if the request may succeed now.
     #[must_use]
-    pub(crate) fn adapt_to_refusal(&self, status: u16, body: &[u8]) -> bool {
+    pub fn adapt_to_refusal(&self, status: u16, body: &[u8]) -> bool {
         self.remote().is_some_and(|model| model.adapt_to_refusal(status, body))
     }
 
     /// True if a line of a batch may have been refused for its content alone.
     #[must_use]
-    pub(crate) fn may_refuse_content(&self, status: u16, body: &[u8]) -> bool {
+    pub fn may_refuse_content(&self, status: u16, body: &[u8]) -> bool {
         self.remote().is_some_and(|model| model.may_refuse_content(status, body))
     }
 
@@ -252,7 +252,7 @@ impl Model {
 
     /// Asks one question; the reservation covers the cost of each of its requests. A question that timed out at a
     /// gateway in an earlier call (`has_timed_out`) is given up at the next timeout.
-    pub(crate) async fn ask_within(
+    pub async fn ask_within(
         &self,
         call: Call<'_>,
         reservation: Option<&Reservation>,

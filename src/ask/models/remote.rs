@@ -13,19 +13,19 @@ use tracing::warn;
 
 use super::finish_words::FinishWords;
 use super::stream_fallback::{AskedBefore, StreamFallback};
-use crate::ask::costs::Reservation;
-use crate::ask::endpoints::{Endpoint, ModelIndex};
-use crate::ask::failures::{AskError, Reach};
-use crate::ask::requests::field::constrained_letter;
-use crate::ask::requests::{
+use crate::costs::Reservation;
+use crate::endpoints::{Endpoint, ModelIndex};
+use crate::failures::{AskError, Reach};
+use crate::requests::field::constrained_letter;
+use crate::requests::{
     AdaptableField, AfterTimeout, Constrain, Message, Parameters, Request, RequestFields, SentFields, Thinking,
     ThinkingBudget, TokenField,
 };
-use crate::ask::vendors::Vendor;
-use crate::ask::wire_kind::Wire;
-use crate::error::{Error, Result};
-use crate::types::questions::letter;
-use crate::types::{FailureKind, Finish, LostAttempts, Reply};
+use crate::vendors::Vendor;
+use crate::wire_kind::Wire;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::questions::letter;
+use darkqa_base::types::{FailureKind, Finish, LostAttempts, Reply};
 
 /// A model of an endpoint with one set of parameters.
 #[derive(Debug)]
@@ -112,7 +112,7 @@ impl Remote {
     }
 
     /// Maximum number of requests in flight at the endpoint at the moment, within
-    /// [`Sending::concurrency`](crate::ask::Sending).
+    /// [`Sending::concurrency`](crate::Sending).
     #[must_use]
     pub fn width(&self) -> usize {
         self.endpoint.width(self.index)
@@ -153,7 +153,7 @@ impl Remote {
 
     /// Flags of the settings that the server refused: they may change within the run.
     #[must_use]
-    pub(crate) fn forced(&self) -> Vec<&'static str> {
+    pub fn forced(&self) -> Vec<&'static str> {
         let forced = self.forced.lock().unwrap_or_else(PoisonError::into_inner);
         forced.iter().copied().collect()
     }

@@ -4,10 +4,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use tracing::warn;
 
-use crate::ask::failures::{AskError, Unfinished};
-use crate::ask::requests::{AfterTimeout, Parameters};
-use crate::ask::wire_kind::{Wire, WireSetting};
-use crate::types::FailureKind;
+use crate::failures::{AskError, Unfinished};
+use crate::requests::{AfterTimeout, Parameters};
+use crate::wire_kind::{Wire, WireSetting};
+use darkqa_base::types::FailureKind;
 
 /// Remedy if a gateway gives up on a reply in one piece.
 const STREAM: &str = "--request wire=chat-stream asks for a stream, which gateways let through";

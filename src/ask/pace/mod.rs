@@ -10,15 +10,12 @@ mod rate_limits;
 mod wait_words;
 mod window;
 
-#[cfg(test)]
-pub(crate) use gate::PaceCause;
-
 pub(super) use gate::Gate;
 pub(super) use rate_limits::{RateLimits, retry_after};
 pub(super) use wait_words::{wait_in_field, wait_in_words};
 pub(super) use window::Window;
 
-pub(crate) use gate::HeldBack;
-pub(crate) use window::ConcurrencyBounds;
+pub use gate::{HeldBack, PaceCause};
+pub use window::ConcurrencyBounds;
 
 pub use rate_limits::Quota;

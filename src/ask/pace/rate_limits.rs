@@ -14,7 +14,7 @@ use jiff::{SignedDuration, Timestamp};
 use reqwest::header::{DATE, HeaderMap, RETRY_AFTER};
 use tokio::time::Instant;
 
-use crate::types::Decides;
+use darkqa_base::types::Decides;
 
 /// Maximum time until the reset of a limit that spaces requests; chosen. Limits per minute reset within a minute. A
 /// limit per hour or day is a budget: requests need not be spread over the rest of the day.

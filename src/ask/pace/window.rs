@@ -23,7 +23,7 @@ impl ConcurrencyBounds {
     /// Bounds for each of `count` replicas, so that these bounds apply to all replicas together, with at least one
     /// request each. The default bounds are not divided: each replica gets them whole.
     #[must_use]
-    pub(crate) fn per_replica(self, count: usize) -> Self {
+    pub fn per_replica(self, count: usize) -> Self {
         if self == Self::DEFAULT {
             return self;
         }

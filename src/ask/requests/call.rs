@@ -15,13 +15,13 @@ use reqwest::header::HeaderMap;
 use serde::Serialize;
 
 use super::field::SentFields;
-use crate::ask::costs::Reservation;
-use crate::ask::endpoints::ModelIndex;
-use crate::ask::failures::{AskError, Reach};
-use crate::ask::wire_kind::Wire;
-use crate::pictures::Payload;
-use crate::types::text::image_mark::{MarkedPiece, pieces};
-use crate::types::{Condition, FailureKind, Question, QuestionId};
+use crate::costs::Reservation;
+use crate::endpoints::ModelIndex;
+use crate::failures::{AskError, Reach};
+use crate::wire_kind::Wire;
+use darkqa_base::types::text::image_mark::{MarkedPiece, pieces};
+use darkqa_base::types::{Condition, FailureKind, Question, QuestionId};
+use darkqa_pictures::Payload;
 
 /// A question to a model: multiple-choice or open.
 #[derive(Debug, Clone, Copy)]
@@ -55,7 +55,7 @@ impl<'a> Query<'a> {
     ///
     /// # Errors
     /// If the question is open.
-    pub(crate) fn require_choices(self) -> Result<&'a Question, AskError> {
+    pub fn require_choices(self) -> Result<&'a Question, AskError> {
         match self {
             Self::Choice(question) => Ok(question),
             Self::Open(id) => {
@@ -80,7 +80,7 @@ pub enum ImagePlaces {
 
 /// Part of a message.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum MessagePart<'a> {
+pub enum MessagePart<'a> {
     /// Text; not empty.
     Text(&'a str),
     Image(&'a Arc<Payload>),
@@ -107,7 +107,7 @@ impl<'a> Message<'a> {
     }
 
     /// Parts of the message, in order.
-    pub(crate) fn parts(&self) -> Vec<MessagePart<'a>> {
+    pub fn parts(&self) -> Vec<MessagePart<'a>> {
         let mut is_placed = vec![false; self.images.len()];
         let before = self.text_parts(self.before, &mut is_placed);
         let after = self.text_parts(self.after, &mut is_placed);
@@ -158,36 +158,36 @@ pub struct Call<'a> {
 
 /// What follows if a gateway gives up on a request.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct AfterTimeout {
+pub struct AfterTimeout {
     /// Number of earlier requests of the question that were charged, certainly or probably, and gave no reply that
     /// counts.
-    pub(crate) charged: u32,
+    pub charged: u32,
     /// True if the caller asks the question in another way, so that the request is not repeated.
-    pub(crate) asks_otherwise: bool,
+    pub asks_otherwise: bool,
     /// What the user can do, for the message.
-    pub(crate) remedy: &'static str,
+    pub remedy: &'static str,
 }
 
 /// One request, which may be sent several times.
-pub(crate) struct Request<'a> {
+pub struct Request<'a> {
     /// Index of the model at the endpoint.
-    pub(crate) model: ModelIndex,
-    pub(crate) wire: Wire,
+    pub model: ModelIndex,
+    pub wire: Wire,
     /// Headers for each replica.
-    pub(crate) headers: &'a [HeaderMap],
-    pub(crate) body: RequestBody,
-    pub(crate) sent: SentFields<'a>,
+    pub headers: &'a [HeaderMap],
+    pub body: RequestBody,
+    pub sent: SentFields<'a>,
     /// Hash of the images: requests about the same images prefer the same replica.
-    pub(crate) affinity: u64,
+    pub affinity: u64,
     /// Handling of gateway timeouts.
-    pub(crate) timeouts: AfterTimeout,
+    pub timeouts: AfterTimeout,
     /// Reservation of the cost of each attempt; `None` if the model has no known price.
-    pub(crate) reservation: Option<&'a Reservation>,
+    pub reservation: Option<&'a Reservation>,
 }
 
 /// A body of known length that is sent in chunks; cloning it copies no bytes.
 #[derive(Debug, Clone)]
-pub(crate) struct RequestBody {
+pub struct RequestBody {
     chunks: Arc<[Bytes]>,
     /// Index of the next chunk to send.
     next: usize,
@@ -195,13 +195,13 @@ pub(crate) struct RequestBody {
 
 impl RequestBody {
     /// Creates a body from its chunks. Empty chunks are not sent.
-    pub(crate) fn new(chunks: impl IntoIterator<Item = Bytes>) -> Self {
+    pub fn new(chunks: impl IntoIterator<Item = Bytes>) -> Self {
         let chunks = chunks.into_iter().collect();
         Self { chunks, next: 0 }
     }
 
     /// The whole body.
-    pub(crate) fn concat(&self) -> Vec<u8> {
+    pub fn concat(&self) -> Vec<u8> {
         self.chunks.concat()
     }
 
@@ -235,8 +235,8 @@ impl Body for RequestBody {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pictures::PayloadFormat;
-    use crate::types::Rgb;
+    use darkqa_base::types::Rgb;
+    use darkqa_pictures::PayloadFormat;
 
     /// Parts of a message with images of 1, 2, … pixels width: texts, and the widths of images.
     fn parts([before, after]: [&str; 2], images: usize, places: ImagePlaces) -> Vec<String> {

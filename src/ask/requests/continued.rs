@@ -7,16 +7,16 @@ use serde_json::{Map, Value};
 
 /// The settings of a stored run that a command continues with others.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Continued {
+pub struct Continued {
     /// Content of the model in the run, as [`Parameters::content`](super::parameters::Parameters) has it.
     pub(super) content: Value,
     /// Settings that differ now or differed in an earlier command.
-    pub(crate) changes: Vec<ChangedSetting>,
+    pub changes: Vec<ChangedSetting>,
 }
 
 /// A setting of a model that has another value than the run began with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct ChangedSetting {
+pub struct ChangedSetting {
     /// The flag, such as `--temperature`.
     pub flag: String,
     /// The value with which the run began; null if unset.
@@ -66,7 +66,7 @@ impl ChangedSetting {
     }
 
     /// True if both set the same flag to the same current value.
-    pub(crate) fn sets_the_same(&self, other: &Self) -> bool {
+    pub fn sets_the_same(&self, other: &Self) -> bool {
         (&self.flag, &self.now) == (&other.flag, &other.now)
     }
 }
@@ -83,7 +83,7 @@ fn parameter_name(flag: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ask::requests::parameters::flag_name;
+    use crate::requests::parameters::flag_name;
 
     #[test]
     fn names_of_parameters_and_flags_correspond() {

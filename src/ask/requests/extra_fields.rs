@@ -12,17 +12,17 @@ use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::ask::endpoints::BaseUrl;
-use crate::ask::secrets::refuse_secrets;
-use crate::error::{Error, Result};
-use crate::files;
-use crate::types::Decides;
-use crate::types::flags::flag_words;
+use crate::endpoints::BaseUrl;
+use crate::secrets::refuse_secrets;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::Decides;
+use darkqa_base::types::flags::flag_words;
 
 /// Flags that add words and fields to every request, or leave fields out.
 #[derive(Debug, Clone, Default, PartialEq, Args)]
 #[command(next_help_heading = "Model")]
-pub(crate) struct RequestArgs {
+pub struct RequestArgs {
     /// JSON object, or a file with one, merged into every request (JSON Merge Patch, RFC 7396: null removes a field);
     /// default: none
     #[arg(long, value_name = "JSON|@FILE", add = Decides::Reply)]
@@ -102,7 +102,7 @@ impl RequestArgs {
     /// # Errors
     /// If a file cannot be read, the system message is empty, a required field is omitted, the JSON is not an object,
     /// or a field is set by the program or looks like a secret. The error does not show the secret.
-    pub(crate) fn resolve(&self) -> Result<ExtraFields> {
+    pub fn resolve(&self) -> Result<ExtraFields> {
         let system = match (&self.system, &self.system_file) {
             (Some(text), _) => Some(text.clone()),
             (None, Some(path)) => Some(files::settings(path)?),
@@ -155,28 +155,28 @@ fn parse_body(value: &str) -> Result<Map<String, Value>> {
 
 impl ExtraFields {
     /// True if the user adds this top-level field.
-    pub(crate) fn adds(&self, field: &str) -> bool {
+    pub fn adds(&self, field: &str) -> bool {
         self.body.contains_key(field)
     }
 
     /// True if the user adds this field to a top-level object.
-    pub(crate) fn adds_below(&self, object: &str, field: &str) -> bool {
+    pub fn adds_below(&self, object: &str, field: &str) -> bool {
         let object = self.body.get(object).and_then(Value::as_object);
         object.is_some_and(|object| object.contains_key(field))
     }
 
     /// Service tier that requests ask for; `None` if they leave it to the server.
-    pub(crate) fn service_tier(&self) -> Option<&str> {
+    pub fn service_tier(&self) -> Option<&str> {
         self.body.get("service_tier")?.as_str()
     }
 
     /// True if a field that limits the tokens of a reply is omitted.
-    pub(crate) fn omits_token_limit(&self) -> bool {
+    pub fn omits_token_limit(&self) -> bool {
         self.omit.iter().any(|field| TOKEN_LIMITS.contains(&&**field))
     }
 
     /// Limit of thinking tokens in the added fields, at any depth; `None` without one.
-    pub(crate) fn thinking_budget(&self) -> Option<ThinkingBudget> {
+    pub fn thinking_budget(&self) -> Option<ThinkingBudget> {
         find_thinking_budget(&self.body)
     }
 
@@ -187,7 +187,7 @@ impl ExtraFields {
     ///
     /// # Errors
     /// If the body is not a JSON object.
-    pub(crate) fn apply(&self, json: String) -> Result<String, serde_json::Error> {
+    pub fn apply(&self, json: String) -> Result<String, serde_json::Error> {
         if self.body.is_empty() && self.omit.is_empty() {
             return Ok(json);
         }
@@ -202,7 +202,7 @@ impl ExtraFields {
 
 /// Limit on the tokens that a model may spend on thinking.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum ThinkingBudget {
+pub enum ThinkingBudget {
     Tokens(u64),
     /// No limit: a negative number, by Google's convention.
     Unlimited,
@@ -287,7 +287,7 @@ struct ServerRow {
 /// Request fields that turn thinking on or off.
 #[derive(Debug, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct ThinkingSwitch {
+pub struct ThinkingSwitch {
     /// Reasoning effort; `None` if the switch does not use it.
     pub(super) effort: Option<String>,
     /// Top-level fields of the body.

@@ -12,12 +12,12 @@ use serde_json::{Map, Value, json};
 
 use super::extra_fields::ThinkingSwitch;
 use super::parameters::{Constrain, Parameters, Temperature, TokenField};
-use crate::ask::endpoints::BaseUrl;
-use crate::ask::failures::ApiError;
-use crate::ask::vendors::Vendor;
-use crate::ask::wire_kind::{Wire, WireSetting};
-use crate::error::{Error, Result};
-use crate::types::questions::letter;
+use crate::endpoints::BaseUrl;
+use crate::failures::ApiError;
+use crate::vendors::Vendor;
+use crate::wire_kind::{Wire, WireSetting};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::questions::letter;
 
 /// Field that a server may refuse and that the program can send in another way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,21 +43,21 @@ pub enum AdaptableField {
 
 /// Values of the adaptable fields. They are the same for all requests of a run, except after a refusal.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct RequestFields {
+pub struct RequestFields {
     /// The API.
-    pub(crate) wire: Wire,
+    pub wire: Wire,
     /// Name of the token limit; never `Auto`.
-    pub(crate) token_field: TokenField,
+    pub token_field: TokenField,
     /// Temperature; `None` to send none.
-    pub(crate) temperature: Option<f64>,
+    pub temperature: Option<f64>,
     /// Seed of the sampling; `None` to send none.
-    pub(crate) seed: Option<u64>,
+    pub seed: Option<u64>,
     /// True to request token counts in a stream.
-    pub(crate) stream_usage: bool,
+    pub stream_usage: bool,
     /// Number of top tokens whose probabilities are requested; `None` to request none.
-    pub(crate) top_logprobs: Option<u8>,
+    pub top_logprobs: Option<u8>,
     /// Switch that turns thinking on or off; `None` to send none.
-    pub(crate) thinking: Option<&'static ThinkingSwitch>,
+    pub thinking: Option<&'static ThinkingSwitch>,
 }
 
 /// Maximum number of top tokens of OpenAI's API and most other servers.
@@ -72,7 +72,7 @@ impl RequestFields {
     /// # Errors
     /// If the server has no known switch for `--thinking`, or if the switch is the reasoning effort and
     /// `--reasoning-effort` is also set.
-    pub(crate) fn initial(parameters: &Parameters, base: &BaseUrl, vendor: Option<&Vendor>) -> Result<Self> {
+    pub fn initial(parameters: &Parameters, base: &BaseUrl, vendor: Option<&Vendor>) -> Result<Self> {
         let thinking = parameters.thinking.map(|thinking| thinking.switch_for(base)).transpose()?;
         let sets_effort = thinking.is_some_and(|switch| switch.effort.is_some());
         if sets_effort && parameters.reasoning_effort.is_some() {
@@ -95,17 +95,17 @@ impl RequestFields {
     }
 
     /// Reasoning effort: from the user, or from the switch for thinking.
-    pub(crate) fn effort<'p>(&self, parameters: &'p Parameters) -> Option<&'p str> {
+    pub fn effort<'p>(&self, parameters: &'p Parameters) -> Option<&'p str> {
         parameters.reasoning_effort.as_deref().or_else(|| self.thinking?.effort.as_deref())
     }
 
     /// Body fields of the switch for thinking.
-    pub(crate) fn thinking_body(&self) -> Option<&'static Map<String, Value>> {
+    pub fn thinking_body(&self) -> Option<&'static Map<String, Value>> {
         self.thinking.map(|switch| &switch.body)
     }
 
     /// Body fields of the switch for thinking, as fields that a server may refuse.
-    pub(crate) fn thinking_fields<'a>(self) -> impl Iterator<Item = RequestField<'a>> {
+    pub fn thinking_fields<'a>(self) -> impl Iterator<Item = RequestField<'a>> {
         self.thinking_body().into_iter().flat_map(Map::keys).map(|name| RequestField {
             name,
             state: FieldState::Sent,
@@ -116,7 +116,7 @@ impl RequestFields {
 
     /// Adapts the fields after the refusal of one of them; `None` if the user set the field, or if no other way is
     /// left. A token limit is first sent under its other name and then omitted.
-    pub(crate) fn after_refusal(self, field: AdaptableField, initial: Self, parameters: &Parameters) -> Option<Self> {
+    pub fn after_refusal(self, field: AdaptableField, initial: Self, parameters: &Parameters) -> Option<Self> {
         let adapted = match field {
             AdaptableField::Wire(wire) if parameters.wire == WireSetting::Auto => Self { wire, ..self },
             AdaptableField::TokenField if parameters.token_field == TokenField::Auto => {
@@ -155,7 +155,7 @@ impl RequestFields {
     }
 
     /// True if a field differs from the `initial` fields.
-    pub(crate) fn differs(self, field: AdaptableField, initial: Self) -> bool {
+    pub fn differs(self, field: AdaptableField, initial: Self) -> bool {
         match field {
             AdaptableField::Wire(_) => self.wire != initial.wire,
             AdaptableField::TokenField => self.token_field != initial.token_field,
@@ -167,7 +167,7 @@ impl RequestFields {
     }
 
     /// Differences from the `initial` fields, as phrases for messages.
-    pub(crate) fn changes(self, initial: Self) -> Vec<String> {
+    pub fn changes(self, initial: Self) -> Vec<String> {
         let wire = match self.wire {
             wire if wire == initial.wire => None,
             Wire::Responses => Some("it is asked through the Responses API".to_owned()),
@@ -197,16 +197,16 @@ impl RequestFields {
 
 /// Content of a request, for the analysis of a refusal.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct SentFields<'a> {
-    pub(crate) parameters: &'a Parameters,
-    pub(crate) fields: RequestFields,
-    pub(crate) has_image: bool,
-    pub(crate) has_key: bool,
+pub struct SentFields<'a> {
+    pub parameters: &'a Parameters,
+    pub fields: RequestFields,
+    pub has_image: bool,
+    pub has_key: bool,
 }
 
 impl<'a> SentFields<'a> {
     /// Flags of the fields sent that not all providers take, those of the user first.
-    pub(crate) fn optional_flags(self) -> Vec<String> {
+    pub fn optional_flags(self) -> Vec<String> {
         let parameters = self.parameters;
         let extra: Vec<&str> = parameters.extra.body.keys().map(String::as_str).collect();
         let flags = [
@@ -228,7 +228,7 @@ impl<'a> SentFields<'a> {
     }
 
     /// Fields that the user adds: the system message and `--extra-body`.
-    pub(crate) fn user_fields(self) -> impl Iterator<Item = RequestField<'a>> {
+    pub fn user_fields(self) -> impl Iterator<Item = RequestField<'a>> {
         let extra = &self.parameters.extra;
         let body_fields = extra.body.keys().map(|name| RequestField {
             name,
@@ -278,7 +278,7 @@ const UNSUPPORTED: [&str; 24] = [
 
 /// Presence of a field in a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum FieldState {
+pub enum FieldState {
     /// The field is sent.
     Sent,
     /// The field is no longer sent, because the server refused it.
@@ -289,13 +289,13 @@ pub(crate) enum FieldState {
 
 impl FieldState {
     /// State of a field that the program does not adapt.
-    pub(crate) fn sent_if(sent: bool) -> Self {
+    pub fn sent_if(sent: bool) -> Self {
         if sent { Self::Sent } else { Self::Absent }
     }
 
     /// State of an adaptable field. If it is not sent, either it was omitted from the start or the server has refused
     /// it.
-    pub(crate) fn until_refused(sent: bool, omitted: bool) -> Self {
+    pub fn until_refused(sent: bool, omitted: bool) -> Self {
         match (sent, omitted) {
             (true, _) => Self::Sent,
             (false, true) => Self::Absent,
@@ -309,19 +309,19 @@ const ORDINARY_WORDS: [&str; 5] = ["detail", "effort", "format", "reasoning", "s
 
 /// Field of a request, with the remedy if it is refused.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct RequestField<'a> {
-    pub(crate) name: &'a str,
+pub struct RequestField<'a> {
+    pub name: &'a str,
     /// Presence in the request.
-    pub(crate) state: FieldState,
+    pub state: FieldState,
     /// Remedy for the user: the flag that changes the field.
-    pub(crate) hint: &'static str,
+    pub hint: &'static str,
     /// The adaptable field, if the program can send it in another way.
-    pub(crate) adaptable: Option<AdaptableField>,
+    pub adaptable: Option<AdaptableField>,
 }
 
 impl<'a> RequestField<'a> {
     /// The temperature or seed sent, if the error is about it and no other field: it mentions no other sent field.
-    pub(crate) fn subject<'f>(fields: &'f [RequestField<'a>], api_error: &ApiError) -> Option<&'f RequestField<'a>> {
+    pub fn subject<'f>(fields: &'f [RequestField<'a>], api_error: &ApiError) -> Option<&'f RequestField<'a>> {
         let mut mentioned = fields.iter().filter(|field| {
             let is_adapted = matches!(field.adaptable, Some(AdaptableField::Temperature { .. } | AdaptableField::Seed));
             let is_ordinary = ORDINARY_WORDS.contains(&field.name) && !is_adapted;
@@ -336,7 +336,7 @@ impl<'a> RequestField<'a> {
     }
 
     /// Flags of the setting that decides the field, if a run may continue with another value after a refusal.
-    pub(crate) fn forced_flags(&self) -> &'static [&'static str] {
+    pub fn forced_flags(&self) -> &'static [&'static str] {
         match self.name {
             "temperature" => &["--temperature"],
             "seed" => &["--sampling-seed"],
@@ -348,7 +348,7 @@ impl<'a> RequestField<'a> {
 
     /// True if the server names the field as the cause: in the `param` of the error, or in a message about an
     /// unsupported field.
-    pub(crate) fn is_named(&self, api_error: &ApiError) -> bool {
+    pub fn is_named(&self, api_error: &ApiError) -> bool {
         if self.is_param(api_error) {
             return true;
         }
@@ -357,12 +357,12 @@ impl<'a> RequestField<'a> {
     }
 
     /// True if the `param` of the error is the field, alone or at the end of a path.
-    pub(crate) fn is_param(&self, api_error: &ApiError) -> bool {
+    pub fn is_param(&self, api_error: &ApiError) -> bool {
         api_error.param.as_deref().is_some_and(|path| last_segment(path) == self.name)
     }
 
     /// True if the error message mentions the field.
-    pub(crate) fn is_mentioned(&self, api_error: &ApiError) -> bool {
+    pub fn is_mentioned(&self, api_error: &ApiError) -> bool {
         mentions(&api_error.message.to_lowercase(), self.name)
     }
 

@@ -1,12 +1,12 @@
 //! Limits on the images in requests to an endpoint: [`ImageLimit`].
 
-use crate::ask::endpoints::Access;
-use crate::error::{Error, Result};
-use crate::types::ImageFacts;
+use crate::endpoints::Access;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::ImageFacts;
 
 /// Limits on the images that an endpoint accepts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct ImageLimit {
+pub struct ImageLimit {
     /// Maximum size of the encoded file, in bytes.
     pub bytes: usize,
     /// Maximum length of a side, in pixels; `None` for any.
@@ -44,11 +44,11 @@ const fn limit(bytes: usize, side: Option<u32>, origin: &'static str) -> ImageLi
 
 impl ImageLimit {
     /// Limit for unknown endpoints: 20 MB, the maximum of all hosted models.
-    pub(crate) const UNKNOWN: Self = limit(20_000_000, None, "the default");
+    pub const UNKNOWN: Self = limit(20_000_000, None, "the default");
 
     /// Limit on single images at an endpoint.
     #[must_use]
-    pub(crate) fn from_access(access: &Access) -> Self {
+    pub fn from_access(access: &Access) -> Self {
         let Some(vendor) = access.vendor else {
             return Self::UNKNOWN;
         };
@@ -60,7 +60,7 @@ impl ImageLimit {
 
     /// Adds the limits on requests with several images to an endpoint.
     #[must_use]
-    pub(crate) fn with_requests_to(mut self, access: &Access) -> Self {
+    pub fn with_requests_to(mut self, access: &Access) -> Self {
         let Some(vendor) = access.vendor else {
             return self;
         };
@@ -76,7 +76,7 @@ impl ImageLimit {
     ///
     /// # Errors
     /// [`Error::Data`] about the request, with the remedy.
-    pub(crate) fn check_request(&self, images: usize, image: Option<&ImageFacts>) -> Result<()> {
+    pub fn check_request(&self, images: usize, image: Option<&ImageFacts>) -> Result<()> {
         if let Some(ProviderLimit { max, origin }) = self.request.images
             && images > max
         {
@@ -102,7 +102,7 @@ impl ImageLimit {
     /// Warning that the body of a request with `images` images, with `image` as the largest, may be too large in
     /// base64. `None` if the images fit in any case.
     #[must_use]
-    pub(crate) fn may_exceed(&self, images: usize, image: &ImageFacts) -> Option<String> {
+    pub fn may_exceed(&self, images: usize, image: &ImageFacts) -> Option<String> {
         let bytes = images * image.bytes.div_ceil(3) * 4;
         let ProviderLimit { max, origin } = self.request.bytes.filter(|limit| bytes > limit.max)?;
         Some(format!(
@@ -117,7 +117,7 @@ impl ImageLimit {
     ///
     /// # Errors
     /// [`Error::Data`] about the image, with the flags that make it smaller.
-    pub(crate) fn check(&self, image: &ImageFacts) -> Result<()> {
+    pub fn check(&self, image: &ImageFacts) -> Result<()> {
         let remedy = "make it smaller with --image max-side=N, or with --image jpeg:95";
         if image.bytes > self.bytes {
             let problem = format!(
@@ -143,7 +143,7 @@ impl ImageLimit {
 
     /// The stricter value of each limit; the origin is that of the smaller file size.
     #[must_use]
-    pub(crate) fn stricter(self, other: Self) -> Self {
+    pub fn stricter(self, other: Self) -> Self {
         let (small, large) = if self.bytes <= other.bytes { (self, other) } else { (other, self) };
         let side = small.side.into_iter().chain(large.side).min();
         let (one, two) = (small.request, large.request);
@@ -157,7 +157,7 @@ impl ImageLimit {
 
     /// Limit from `--image max-mb`.
     #[must_use]
-    pub(crate) fn from_user(bytes: usize) -> Self {
+    pub fn from_user(bytes: usize) -> Self {
         limit(bytes, None, "--image max-mb")
     }
 }
@@ -190,7 +190,7 @@ mod tests {
     /// A PNG file of this many bytes and this width.
     fn image(bytes: usize, width: usize) -> ImageFacts {
         ImageFacts {
-            digest: crate::types::Digest::from_bytes(b""),
+            digest: darkqa_base::types::Digest::from_bytes(b""),
             bytes,
             width,
             height: 10,

@@ -7,11 +7,11 @@ pub(super) mod field;
 mod image_limit;
 mod parameters;
 
-pub(crate) use call::ImagePlaces;
-pub(crate) use continued::ChangedSetting;
-pub(crate) use extra_fields::RequestArgs;
-pub(crate) use image_limit::ImageLimit;
-pub(crate) use parameters::by_flag;
+pub use call::ImagePlaces;
+pub use continued::ChangedSetting;
+pub use extra_fields::RequestArgs;
+pub use image_limit::ImageLimit;
+pub use parameters::by_flag;
 
 pub use call::{Call, Message, Query};
 pub use extra_fields::{ExtraFields, Thinking};

@@ -14,11 +14,11 @@ use serde_json::{Map, Value, json};
 
 use super::continued::{ChangedSetting, Continued};
 use super::extra_fields::{ExtraFields, Thinking};
-use crate::ask::wire_kind::WireSetting;
-use crate::error::{Error, Result};
-use crate::types::Decides;
-use crate::types::flags::flag_words;
-use crate::types::text::words::written_as_text;
+use crate::wire_kind::WireSetting;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Decides;
+use darkqa_base::types::flags::flag_words;
+use darkqa_base::types::text::words::written_as_text;
 
 /// The name of a model and the settings of its replies; a setting that is `None` is left out of the request.
 ///
@@ -91,7 +91,7 @@ pub struct Parameters {
 
 impl Parameters {
     /// True if the model was told to think.
-    pub(crate) fn asks_to_think(&self) -> bool {
+    pub fn asks_to_think(&self) -> bool {
         let effort = self.reasoning_effort.as_deref();
         self.thinking == Some(Thinking::On) || effort.is_some_and(|effort| effort != "none")
     }
@@ -122,34 +122,35 @@ impl Parameters {
     }
 
     /// Token limit in requests; `None` to send none.
-    pub(crate) fn limit(&self) -> Option<u32> {
+    pub fn limit(&self) -> Option<u32> {
         (self.token_field != TokenField::Omit).then_some(self.max_tokens.get())
     }
 
     /// Token limit in requests, if the run began with another one.
-    pub(crate) fn changed_limit(&self) -> Option<u32> {
+    pub fn changed_limit(&self) -> Option<u32> {
         self.limit().filter(|_| self.first_max_tokens.is_some())
     }
 
     /// Token limit with which the run began.
-    pub(crate) fn first_limit(&self) -> u32 {
+    pub fn first_limit(&self) -> u32 {
         self.first_max_tokens.unwrap_or(self.max_tokens).get()
     }
 
     /// True if the user did not set the temperature.
-    pub(crate) fn is_default_temperature(&self) -> bool {
+    pub fn is_default_temperature(&self) -> bool {
         self.temperature == Temperature::Auto || self.origin.default_temperature
     }
 
     /// The settings that differ from those in a run's column of the model; the address is ignored.
-    pub(crate) fn changes_from_column(&self, column: &Value) -> Vec<ChangedSetting> {
+    pub fn changes_from_column(&self, column: &Value) -> Vec<ChangedSetting> {
         let own = self.content().as_object().cloned().unwrap_or_default();
         ChangedSetting::between(column, &by_flag(own))
     }
 
     /// The same settings for a run whose column of the model has other ones, with the changes; its trial keys keep the
     /// column's settings.
-    pub(crate) fn continuing(&self, column: &Value, changes: Vec<ChangedSetting>) -> Self {
+    #[must_use]
+    pub fn continuing(&self, column: &Value, changes: Vec<ChangedSetting>) -> Self {
         let first = column["--max-tokens"]
             .as_u64()
             .and_then(|limit| NonZeroU32::new(u32::try_from(limit).ok()?))
@@ -166,19 +167,19 @@ impl Parameters {
 
     /// The same settings for a run that began with the smaller token limit `first`, which remains in the keys of its
     /// trials. `None` if the limit of these settings is not larger or not sent.
-    pub(crate) fn raised_from(&self, first: NonZeroU32) -> Option<Self> {
+    pub fn raised_from(&self, first: NonZeroU32) -> Option<Self> {
         let is_larger = self.limit()? > first.get();
         is_larger.then(|| Self { first_max_tokens: Some(first), ..self.clone() })
     }
 
     /// The same settings for a run whose column of the model differs only in a smaller token limit; otherwise `None`.
-    pub(crate) fn raised_from_column(&self, column: &Value) -> Option<Self> {
+    pub fn raised_from_column(&self, column: &Value) -> Option<Self> {
         let first = u32::try_from(column["--max-tokens"].as_u64()?).ok()?;
         self.raised_from(NonZeroU32::new(first)?).filter(|raised| raised.match_column(column))
     }
 
     /// True if the settings that decide a reply equal those in a run's column of the model; the address is ignored.
-    pub(crate) fn match_column(&self, column: &Value) -> bool {
+    pub fn match_column(&self, column: &Value) -> bool {
         let Value::Object(content) = self.content() else {
             return false;
         };
@@ -191,7 +192,7 @@ impl Parameters {
     ///
     /// # Errors
     /// [`Error::Usage`] unless the temperature is 0 or the server's default.
-    pub(crate) fn require_greedy(&self) -> Result<()> {
+    pub fn require_greedy(&self) -> Result<()> {
         match self.temperature {
             Temperature::Of(value) if value > 0.0 => Err(Error::usage(
                 "--request probabilities",
@@ -202,7 +203,7 @@ impl Parameters {
     }
 
     /// Settings that can change a reply, including the API and the token limit, but not the name of its field.
-    pub(crate) fn content(&self) -> Value {
+    pub fn content(&self) -> Value {
         if let Some(first) = &self.origin.continued {
             return first.content.clone();
         }
@@ -215,7 +216,7 @@ impl Parameters {
 }
 
 /// Renames the keys of a model's settings to flags.
-pub(crate) fn by_flag(content: Map<String, Value>) -> Map<String, Value> {
+pub fn by_flag(content: Map<String, Value>) -> Map<String, Value> {
     content.into_iter().map(|(name, value)| (flag_name(&name), value)).collect()
 }
 
@@ -224,13 +225,13 @@ pub(crate) fn by_flag(content: Map<String, Value>) -> Map<String, Value> {
 pub struct SettingsOrigin {
     /// Settings of the run that these settings continue, which remain in the keys of its trials; `None` if they are the
     /// same.
-    pub(crate) continued: Option<Box<Continued>>,
+    pub continued: Option<Box<Continued>>,
     /// True if the user did not set the temperature.
-    pub(crate) default_temperature: bool,
+    pub default_temperature: bool,
     /// True if the user did not set the seed.
-    pub(crate) default_seed: bool,
+    pub default_seed: bool,
     /// True for the judge of open answers, whose settings have flags of their own.
-    pub(crate) is_judge: bool,
+    pub is_judge: bool,
 }
 
 /// Flag that sets a parameter.

@@ -12,7 +12,7 @@ use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
 use clap::ValueEnum;
 use serde_json::Value;
 
-use crate::types::flags::flag_words;
+use darkqa_base::types::flags::flag_words;
 
 /// Prefixes of the keys of common vendors.
 const KEY_PREFIXES: [&str; 6] = ["sk-", "AIza", "gsk_", "xai-", "hf_", "Bearer "];
@@ -22,7 +22,7 @@ const MIN_LENGTH: usize = 20;
 
 /// True if a text that should be the name of a variable looks like a key: it has the prefix of a key, a character that
 /// variable names do not have, or is a long mixture of letters and digits without an underscore.
-pub(crate) fn looks_like_key(name: &str) -> bool {
+pub fn looks_like_key(name: &str) -> bool {
     let is_variable_name = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     is_secret_value(name) || !is_variable_name || is_long_mixture(name)
 }
@@ -49,7 +49,7 @@ pub(super) fn is_shell_text(key: &str) -> bool {
 
 /// True if a value has the form of a secret: the prefix of a key, a private key, a service account or a token with a
 /// signature.
-pub(crate) fn is_secret_value(value: &str) -> bool {
+pub fn is_secret_value(value: &str) -> bool {
     KEY_PREFIXES.iter().any(|prefix| value.starts_with(prefix) && value.len() > prefix.len())
         || is_private_key(value)
         || is_web_token(value)
@@ -88,7 +88,7 @@ const BEFORE_KEY: [&str; 9] =
 
 /// True if a header or field of this name usually contains a secret: one of its words says so. A word that only
 /// contains such a word is another one: `x-portkey-trace-id`, `X-Author`, `tokenizer`.
-pub(crate) fn is_secret_name(name: &str) -> bool {
+pub(super) fn is_secret_name(name: &str) -> bool {
     let words = name_words(name);
     words.iter().enumerate().any(|(place, word)| {
         let word = word.strip_suffix('s').unwrap_or(word);
@@ -103,7 +103,7 @@ pub(crate) fn is_secret_name(name: &str) -> bool {
 
 /// True if the value of a header is a secret: by its form, or by the name and a length of at least [`MIN_LENGTH`]. A
 /// name whose last word only ends with `key` (`x-mykey`) counts if the value is one long mixture of letters and digits.
-pub(crate) fn is_secret_header(name: &str, value: &str) -> bool {
+pub fn is_secret_header(name: &str, value: &str) -> bool {
     let ends_like_key = name.to_lowercase().ends_with("key");
     is_secret_value(value)
         || value.len() >= MIN_LENGTH && (is_secret_name(name) || ends_like_key && is_random_text(value))

@@ -5,6 +5,6 @@ mod secret;
 
 pub(super) use secret::{Scrub, refuse_secrets, without_secrets};
 
-pub(crate) use key_form::{KeyHeader, is_secret_header, is_secret_value, looks_like_key};
+pub use key_form::{KeyHeader, is_secret_header, is_secret_value, looks_like_key};
 
 pub use secret::Secret;

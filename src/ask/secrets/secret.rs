@@ -16,9 +16,9 @@ use base64::engine::general_purpose::STANDARD_NO_PAD;
 use serde_json::{Map, Value};
 
 use super::key_form::{is_key_in_place_of_file, is_key_object, is_secret_name, is_secret_value, is_shell_text};
-use crate::error::{Error, Result};
-use crate::files;
-use crate::types::{Finish, OtherField, Reply, TokenChances, TokenPosition};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::{Finish, OtherField, Reply, TokenChances, TokenPosition};
 
 /// Maximum size of a key file, in bytes. Chosen: twice the longest tokens.
 const MAX_FILE: u64 = 4096;
@@ -58,7 +58,7 @@ impl Secret {
     /// # Errors
     /// If the file cannot be read, or is not a single line of visible ASCII, such as a file named by mistake. The error
     /// shows neither its content nor a key in place of the path.
-    pub(crate) fn read(path: &Path) -> Result<Self> {
+    pub fn read(path: &Path) -> Result<Self> {
         let bytes = files::at_most(path, MAX_FILE).map_err(|error| {
             if path.to_str().is_some_and(is_key_in_place_of_file) {
                 Error::usage(
@@ -79,7 +79,7 @@ impl Secret {
     }
 
     /// The key as plain text, for HTTP headers.
-    pub(crate) fn expose(&self) -> &str {
+    pub fn expose(&self) -> &str {
         &self.0
     }
 }
@@ -107,7 +107,7 @@ const MIN_SECRET_IN_REPLY: usize = 16;
 /// Filter that makes the text of a server safe for terminals, logs and tables: removes secrets and control characters,
 /// and shortens it.
 #[derive(Clone, Default)]
-pub(crate) struct Scrub {
+pub struct Scrub {
     /// Secrets, longest first: if one secret contains another, no part of the longer one must remain.
     secrets: Vec<String>,
     /// Parts of the secrets that are long enough for [`MIN_SECRET_IN_REPLY`].
@@ -116,7 +116,7 @@ pub(crate) struct Scrub {
 
 impl Scrub {
     /// Creates a filter for these secrets.
-    pub(crate) fn new(secrets: impl IntoIterator<Item = String>) -> Self {
+    pub fn new(secrets: impl IntoIterator<Item = String>) -> Self {
         let mut secrets: Vec<String> = secrets.into_iter().filter(|secret| secret.len() >= MIN_SECRET).collect();
         secrets.sort_by_key(|secret| std::cmp::Reverse(secret.len()));
         secrets.dedup();
@@ -125,12 +125,12 @@ impl Scrub {
     }
 
     /// This filter, which also removes another secret.
-    pub(crate) fn with(&self, secret: String) -> Self {
+    pub fn with(&self, secret: String) -> Self {
         Self::new(self.secrets.iter().cloned().chain([secret]))
     }
 
     /// True if there are no secrets to remove.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.secrets.is_empty()
     }
 
@@ -141,7 +141,7 @@ impl Scrub {
 
     /// Removes keys from a line of JSON. Each string is filtered alone. Ids of requests in a batch are not searched for
     /// parts of keys.
-    pub(crate) fn json_line(&self, line: String) -> String {
+    pub fn json_line(&self, line: String) -> String {
         let line = self.without_whole_keys(line);
         let parts: Vec<&str> = line.split('"').collect();
         parts
@@ -161,7 +161,7 @@ impl Scrub {
     }
 
     /// Puts a text on one line of at most 300 characters, without secrets and hidden characters.
-    pub(crate) fn line(&self, text: &str) -> String {
+    pub fn line(&self, text: &str) -> String {
         let text = &text[..text.floor_char_boundary(MAX_READ)];
         let visible: String = text.chars().filter(|c| !is_hidden(*c)).collect();
         let words: Vec<&str> = visible.split_whitespace().collect();

@@ -10,16 +10,16 @@ use serde_json::{Map, Value, json};
 use super::finish_reason::{self, ReplyEnding};
 use super::message_fields::{self, refusal_field, words};
 use super::{logprobs, stream, usage};
-use crate::ask::bounded_json::parse;
-use crate::ask::failures::{ApiError, ReplyError, Unreadable, Wording, page_title};
-use crate::ask::requests::{
+use crate::bounded_json::parse;
+use crate::failures::{ApiError, ReplyError, Unreadable, Wording, page_title};
+use crate::requests::{
     AdaptableField, Constrain, FieldState, ImageDetail, Message, MessagePart, Parameters, RequestBody, RequestField,
     RequestFields, SentFields, Temperature, TokenField, field, images,
 };
-use crate::ask::wire_kind::Wire;
-use crate::pictures::Payload;
-use crate::types::questions::letter;
-use crate::types::{Finish, Reply, Thought, TokenChances, Usage};
+use crate::wire_kind::Wire;
+use darkqa_base::types::questions::letter;
+use darkqa_base::types::{Finish, Reply, Thought, TokenChances, Usage};
+use darkqa_pictures::Payload;
 
 /// Body of a request without its messages, which are appended.
 #[derive(Serialize)]

@@ -2,7 +2,7 @@
 //!
 //! A reply that the server ended deliberately and would end so again, by a filter, a limit or a loop, is the model's:
 //! it is scored as unread and asked once. A generation that the server gave up is a failure and asked again. A word in
-//! no list may mean either; [`FinishWords`](crate::ask::models) decides it by a second try, so that a vendor's choice
+//! no list may mean either; [`FinishWords`](crate::models) decides it by a second try, so that a vendor's choice
 //! of words moves no accuracy.
 //!
 //! Refusals of an API: [`requested_wire`] finds the API that the server asks for instead.
@@ -11,9 +11,9 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use crate::ask::failures::{ApiError, Unreadable};
-use crate::ask::wire_kind::Wire;
-use crate::types::{Finish, Usage};
+use crate::failures::{ApiError, Unreadable};
+use crate::wire_kind::Wire;
+use darkqa_base::types::{Finish, Usage};
 
 /// Finish reasons of servers, grouped by meaning; in lower case, with underscores.
 #[derive(Debug, Default, Deserialize)]
@@ -71,7 +71,7 @@ pub(super) fn read(reason: &str, usage: Option<Usage>) -> Result<ReplyEnding, Bo
 }
 
 /// True if a finish reason means that prompt and reply are as long as the model's context.
-pub(crate) fn is_context_full(word: &str) -> bool {
+pub fn is_context_full(word: &str) -> bool {
     REASONS.context.contains(&Finish::normalized(word))
 }
 

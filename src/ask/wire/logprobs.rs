@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::usage;
-use crate::types::{Thought, TokenPosition};
+use darkqa_base::types::{Thought, TokenPosition};
 
 /// Maximum number of positions to read; chosen: the answer is at the beginning, at most after the few tokens of a JSON
 /// field.

@@ -5,8 +5,8 @@
 
 use serde_json::Value;
 
-use crate::ask::bounded_json::parse;
-use crate::types::OtherField;
+use crate::bounded_json::parse;
+use darkqa_base::types::OtherField;
 
 /// A text field of a content part; empty if it is absent.
 pub(super) fn words<'a>(part: &'a Value, field: &str) -> &'a str {

@@ -18,13 +18,13 @@ use super::failures::{ApiError, ReplyError};
 use super::requests::{Message, Parameters, RequestBody, RequestField, RequestFields, SentFields};
 use super::secrets::{KeyHeader, Secret};
 use super::wire_kind::Wire;
-use crate::error::{Error, Result};
-use crate::types::{Reply, Usage};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::{Reply, Usage};
 
 pub(super) use finish_reason::requested_wire;
 pub(super) use usage::{cost_in_headers, with_cost};
 
-pub(crate) use finish_reason::is_context_full;
+pub use finish_reason::is_context_full;
 
 impl Wire {
     /// Headers of every request: the key in the header `form`.

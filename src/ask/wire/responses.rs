@@ -10,13 +10,13 @@ use super::chat::{self, OMIT_PROBABILITIES, is_end, with_images};
 use super::finish_reason::{self, ReplyEnding};
 use super::message_fields::{text_of, tool_call, words};
 use super::{logprobs, stream, usage};
-use crate::ask::failures::{ApiError, ReplyError, Unreadable};
-use crate::ask::requests::{
+use crate::failures::{ApiError, ReplyError, Unreadable};
+use crate::requests::{
     AdaptableField, Constrain, FieldState, ImageDetail, Message, MessagePart, Parameters, RequestBody, RequestField,
     RequestFields, SentFields, Temperature, TokenField, field, images,
 };
-use crate::types::questions::letter;
-use crate::types::{Finish, OtherField, Reply, Thought, TokenChances, Usage};
+use darkqa_base::types::questions::letter;
+use darkqa_base::types::{Finish, OtherField, Reply, Thought, TokenChances, Usage};
 
 /// Body of a request without its input, which is appended.
 #[derive(Serialize)]

@@ -4,8 +4,8 @@ use serde_json::{Map, Value, json};
 
 use super::message_fields::refusal_field;
 use super::usage;
-use crate::ask::bounded_json::{MAX_ITEMS, parse};
-use crate::ask::failures::find_error;
+use crate::bounded_json::{MAX_ITEMS, parse};
+use crate::failures::find_error;
 
 /// True if a body is an event stream, by its content type or its first characters.
 pub(super) fn is_stream(text: &str, content_type: &str) -> bool {

@@ -23,7 +23,7 @@ use std::sync::{Mutex, PoisonError};
 use reqwest::header::HeaderMap;
 use serde_json::{Map, Value, json};
 
-use crate::types::{ServiceTier, StatedCost, Usage};
+use darkqa_base::types::{ServiceTier, StatedCost, Usage};
 
 /// Where a body, or an event of a stream, has its token usage, as JSON pointers; the first that is there counts. A
 /// vendor with a place of its own is a row here, and names of its own are words in [`read`].
@@ -329,7 +329,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::ask::costs::Price;
+    use crate::costs::Price;
 
     /// Usages of several vendors, with the charged prompt and reply tokens.
     fn vendors() -> [(&'static str, Value, [u64; 2]); 8] {
@@ -384,7 +384,7 @@ mod tests {
             output: 100.0,
             cached_input: None,
             image_tokens: None,
-            tiers: crate::ask::costs::TierFactors::default(),
+            tiers: crate::costs::TierFactors::default(),
         };
         for (vendor, usage, [prompt, reply]) in vendors() {
             let read = read(Some(&usage)).unwrap();

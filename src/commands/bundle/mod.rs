@@ -16,16 +16,16 @@ use sha2::{Digest as _, Sha256};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
-use crate::error::{Error, Result};
-use crate::files;
-use crate::report::joined::stamp::STAMP;
-use crate::report::joined::whole_report;
-use crate::runs::Outcome;
-use crate::runs::record_table::RECORDS_PARQUET;
-use crate::runs::stored::run_name;
-use crate::store::INDEX;
-use crate::types::Decides;
-use crate::types::manifests::Status;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::Decides;
+use darkqa_base::types::manifests::Status;
+use darkqa_report::joined::stamp::STAMP;
+use darkqa_report::joined::whole_report;
+use darkqa_runs::Outcome;
+use darkqa_runs::record_table::RECORDS_PARQUET;
+use darkqa_runs::stored::run_name;
+use darkqa_store::INDEX;
 use readme::{ReadmeInputs, command, readme};
 use redact::{RedactedRun, Redactor};
 

@@ -5,11 +5,11 @@ use std::fmt::Write;
 
 use serde_json::{Value, json};
 
-use crate::runs::stored::{AnyRun, text_setting};
-use crate::types::flags::keyed_form;
-use crate::types::manifests::{RunManifest, judge_flag};
-use crate::types::text::escape_hidden;
-use crate::types::{AxisLevel, Trials, shell_word};
+use darkqa_base::types::flags::keyed_form;
+use darkqa_base::types::manifests::{RunManifest, judge_flag};
+use darkqa_base::types::text::escape_hidden;
+use darkqa_base::types::{AxisLevel, Trials, shell_word};
+use darkqa_runs::stored::{AnyRun, text_setting};
 use darkqa_score::answers::record::Detail;
 
 /// Inputs of a README.

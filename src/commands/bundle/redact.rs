@@ -12,12 +12,11 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
-use crate::error::{Error, Result};
-use crate::report::page::fitting_thumbnails;
-use crate::runs::stored::{AnyRun, ExperimentKind, RunFiles, StoredRun, read_run_manifest};
-use crate::store;
-use crate::types::manifests::RunManifest;
-use crate::types::{Record, Thumbnail};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_base::types::{Record, Thumbnail};
+use darkqa_report::page::fitting_thumbnails;
+use darkqa_runs::stored::{AnyRun, ExperimentKind, RunFiles, StoredRun, read_run_manifest};
 use darkqa_score::answers::record::Detail;
 
 /// Minimum length of a key in an environment variable, in bytes (chosen): shorter values may be ordinary words.
@@ -299,13 +298,13 @@ impl RedactedRun {
                 let files = RunFiles::read(folder)?;
                 let frames: Vec<_> = files.questions.iter().map(|q| q.frame.clone()).collect();
                 let shown = |all: &[Thumbnail]| fitting_thumbnails(all, &frames);
-                let records = store::read_records(folder)?;
+                let records = darkqa_store::read_records(folder)?;
                 let data = RedactedData::new(records, files, thumbnails, shown, redactor)?;
                 let run = StoredRun::from_records(place, manifest.clone(), data.records, data.lines)?;
                 Self::new(manifest, data.files, AnyRun::Choice(run), data.thumbnails)
             }
             ExperimentKind::Open => {
-                let records = store::read_records(folder)?;
+                let records = darkqa_store::read_records(folder)?;
                 let files = RunFiles::read(folder)?;
                 let shown = <[Thumbnail]>::to_vec;
                 let data = RedactedData::new(records, files, thumbnails, shown, redactor)?;

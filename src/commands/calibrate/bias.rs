@@ -16,7 +16,7 @@ use super::frames::{Frame, FrameReader, HotPixels, Inputs, Layout, TILES, in_bat
 use super::read_noise::{PlotFit, ReadNoise, plot_fit};
 use super::recording::SettingFiles;
 use super::sums::{Centres, PairNoise, PairSums, PlaneSums, ResidualHistogram};
-use crate::error::{Error, Result};
+use darkqa_base::error::{Error, Result};
 
 /// Results of the bias frames of a setting.
 #[derive(Debug)]

@@ -18,21 +18,21 @@ use super::{Measured, NoiseLine, SettingFit, SlopeSource};
 use crate::commands::calibrate::{
     CalibrateSettings, CameraFit, Cfa, Crop, ReadOptions, Recording, calibrate as measure,
 };
-use crate::data::PixelLimit;
-use crate::engine::images::progress::Progress;
-use crate::engine::images::workers::{ThreadArgs, pool};
-use crate::error::{Error, Result};
-use crate::files::write;
-use crate::report::charts::chart::{LineContent, LineStyle, Panel, PlotLine, Scale};
-use crate::report::charts::paper::point_figure;
-use crate::report::text::table::ColumnKind::Text;
-use crate::report::text::table::TableBuilder;
-use crate::report::text::terminal;
-use crate::runs::Outcome;
-use crate::types::Decides;
-use crate::types::manifests::Status;
-use crate::types::text::counted;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::write;
+use darkqa_base::types::Decides;
+use darkqa_base::types::manifests::Status;
+use darkqa_base::types::text::counted;
+use darkqa_data::PixelLimit;
+use darkqa_engine::images::progress::Progress;
+use darkqa_engine::images::workers::{ThreadArgs, pool};
 use darkqa_light::Calibration;
+use darkqa_report::charts::chart::{LineContent, LineStyle, Panel, PlotLine, Scale};
+use darkqa_report::charts::paper::point_figure;
+use darkqa_report::text::table::ColumnKind::Text;
+use darkqa_report::text::table::TableBuilder;
+use darkqa_report::text::terminal;
+use darkqa_runs::Outcome;
 
 /// The flags of `calibrate`.
 #[derive(Debug, Args)]

@@ -15,8 +15,8 @@ use super::frames::{Frame, FrameReader, HotPixels, Inputs, in_batches};
 use super::mosaic::FrameFacts;
 use super::recording::{ExposureFiles, MIN_EXPOSURES, SettingFiles};
 use super::sums::{NeighbourSums, PairNoise, PairSums, PlaneSums, TileSums, TopCode};
-use crate::error::{Error, Result};
-use crate::types::Digest;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Digest;
 
 /// Range of light to use, as shares of white above the offset. EMVA 1288 release 4 Linear fits up to 70 % of
 /// saturation. The lower end is chosen: below it, errors of the offset matter; the corners of a frame with 2 % in its

@@ -21,9 +21,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::mosaic::{FrameFacts, Mosaic};
-use crate::error::{Error, Result};
-use crate::types::Digest;
-use crate::types::flags::flag_words;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Digest;
+use darkqa_base::types::flags::flag_words;
 
 /// Minimum number of rows and of columns of a frame (chosen for row means and the correlation of neighbours).
 const MIN_SIDE: usize = 256;

@@ -35,8 +35,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::error::{Error, Result};
-use crate::types::Digest;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Digest;
 use frames::{FrameReader, Inputs, in_batches};
 use lines::NoiseKind;
 use mosaic::FrameFacts;

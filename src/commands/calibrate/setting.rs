@@ -16,8 +16,8 @@ use super::frames::{FrameReader, Inputs};
 use super::read_noise::PlotFit;
 use super::recording::SettingFiles;
 use super::sums::STEPS;
-use crate::error::{Error, Result};
-use crate::types::FrameId;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::FrameId;
 use darkqa_light::draws::tukey_lambda;
 use darkqa_light::{Component, NoiseKey, Site};
 

@@ -26,10 +26,10 @@ use crate::commands::show::ShowArgs;
 use crate::commands::site::SiteArgs;
 use crate::commands::study;
 use crate::commands::synthesize::SynthesizeCommand;
-use crate::engine::batch::{BatchFileArgs, BatchRunArgs};
-use crate::report::joined::ReportArgs;
-use crate::types::Decides;
-use crate::types::flags::KeyedFlag;
+use darkqa_base::types::Decides;
+use darkqa_base::types::flags::KeyedFlag;
+use darkqa_engine::batch::{BatchFileArgs, BatchRunArgs};
+use darkqa_report::joined::ReportArgs;
 
 use super::keyed::{name_of, with_keyed_flags};
 

@@ -3,8 +3,8 @@
 use clap::builder::PossibleValue;
 use clap::{Arg, ArgAction, Command, Id};
 
-use crate::types::Decides;
-use crate::types::flags::{KEYED_FLAGS, KeyedFlag, flag_spelling};
+use darkqa_base::types::Decides;
+use darkqa_base::types::flags::{KEYED_FLAGS, KeyedFlag, flag_spelling};
 
 /// The name of a flag in files, which is the name of the field.
 pub(super) fn name_of(arg: &Arg) -> String {

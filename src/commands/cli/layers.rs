@@ -27,12 +27,12 @@ use toml::{Table, Value};
 use self::expansion::Expansion;
 use super::command::SHORT_HELP;
 use super::keyed::{name_of, spell_as_keys};
-use crate::ask::OPENAI_KEY;
-use crate::engine::models::{RunDefault, run_defaults};
-use crate::error::{Error, Result};
-use crate::files;
-use crate::types::shell_word;
-use crate::types::text::{TomlFault, did_you_mean, nearest, suggestion};
+use darkqa_ask::OPENAI_KEY;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::shell_word;
+use darkqa_base::types::text::{TomlFault, did_you_mean, nearest, suggestion};
+use darkqa_engine::models::{RunDefault, run_defaults};
 use expansion::{LayeredValue, text_of};
 
 /// Prefix of this program's environment variables.

@@ -8,9 +8,9 @@ use clap::{Arg, Command as Clap, CommandFactory as _};
 use super::command;
 use super::*;
 use crate::commands::cli::keyed::{name_of, with_keyed_flags, with_value};
-use crate::types::Decides;
-use crate::types::flags::{KEYED_FLAGS, keyed_form};
 use clap::FromArgMatches as _;
+use darkqa_base::types::Decides;
+use darkqa_base::types::flags::{KEYED_FLAGS, keyed_form};
 use std::ffi::OsString;
 
 #[test]

@@ -12,28 +12,28 @@ use super::samples::Sample;
 use super::settings::{DesignShare, ImagePlace, shown_questions};
 use super::setup::{ChoiceSetup, is_other_room};
 use super::write_plan::{power_forecast, run_contents};
-use crate::ask::{ImagePlaces, Query, Wording};
-use crate::engine::experiment::Experiment;
-use crate::engine::images::frames::{Frames, Source};
-use crate::engine::images::recipes::Recipe;
-use crate::engine::images::trials::{ASK, Item, Prompt, SourcePlan, Stimulus, Trial, TrialGroup};
-use crate::engine::key_facts::KeyFacts;
-use crate::engine::manifest;
-use crate::engine::models::{ModelUnderTest, asked_in};
-use crate::engine::settings::JobSettings;
-use crate::error::{Error, Result};
-use crate::report::joined;
-use crate::runs::forecast::PowerForecast;
-use crate::runs::stored::StoredRun;
-use crate::runs::{EXPOSURE_VALUE, Outcome, PROMPTS, StdoutFormat};
-use crate::store::Store;
-use crate::types::manifests::{Columns, Identity, PartPlace, RunManifest};
-use crate::types::{
+use darkqa_ask::{ImagePlaces, Query, Wording};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::{Columns, Identity, PartPlace, RunManifest};
+use darkqa_base::types::{
     ChoiceDetail, Condition, Digest, FrameId, Question, Record, RunQuestion, SetLight, Shared, TrialOutcome, View,
 };
+use darkqa_engine::experiment::Experiment;
+use darkqa_engine::images::frames::{Frames, Source};
+use darkqa_engine::images::recipes::Recipe;
+use darkqa_engine::images::trials::{ASK, Item, Prompt, SourcePlan, Stimulus, Trial, TrialGroup};
+use darkqa_engine::key_facts::KeyFacts;
+use darkqa_engine::manifest;
+use darkqa_engine::models::{ModelUnderTest, asked_in};
+use darkqa_engine::settings::JobSettings;
 use darkqa_questions::rules::Rules;
+use darkqa_report::joined;
+use darkqa_runs::forecast::PowerForecast;
+use darkqa_runs::stored::StoredRun;
+use darkqa_runs::{EXPOSURE_VALUE, Outcome, PROMPTS, StdoutFormat};
 use darkqa_score::model_in_condition::is_reference;
 use darkqa_score::variation::random_half;
+use darkqa_store::Store;
 
 impl Experiment for ChoiceSetup<'_> {
     type Item = ChoiceItem;

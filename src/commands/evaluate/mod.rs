@@ -7,11 +7,11 @@ mod settings;
 mod setup;
 mod write_plan;
 
-use crate::engine::Job;
-use crate::engine::batch::{BatchFileArgs, BatchRunArgs};
-use crate::engine::images::progress::Progress;
-use crate::error::Result;
-use crate::runs::Outcome;
+use darkqa_base::error::Result;
+use darkqa_engine::Job;
+use darkqa_engine::batch::{BatchFileArgs, BatchRunArgs};
+use darkqa_engine::images::progress::Progress;
+use darkqa_runs::Outcome;
 use setup::ChoiceSetup;
 
 pub(crate) use check::{CheckArgs, check};

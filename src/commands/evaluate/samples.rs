@@ -4,11 +4,11 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-use crate::data::Dataset;
-use crate::engine::images::frames::{Source, first_question_per_frame};
-use crate::error::Result;
-use crate::runs::run_plan::RunPlan;
-use crate::types::{Digest, FrameId, Question, QuestionId};
+use darkqa_base::error::Result;
+use darkqa_base::types::{Digest, FrameId, Question, QuestionId};
+use darkqa_data::Dataset;
+use darkqa_engine::images::frames::{Source, first_question_per_frame};
+use darkqa_runs::run_plan::RunPlan;
 
 /// A question with its places in the run.
 #[derive(Debug)]
@@ -123,7 +123,7 @@ impl OtherRooms {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::{Choices, Evidence, Family};
+    use darkqa_base::types::{Choices, Evidence, Family};
 
     fn others(frames: &str) -> Option<String> {
         let questions: Vec<Question> = frames

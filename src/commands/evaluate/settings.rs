@@ -10,20 +10,20 @@ use std::path::Path;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use crate::ask::{Constrain, PromptSet, Wording};
-use crate::data::{BankArgs, DataArgs, DataSource, Dataset, DecodeArgs, SceneArgs, SelectionArgs, SetArgs};
-use crate::engine::images::recipes::Recipe;
-use crate::engine::images::trials::{ASK, QuestionBank, rules};
-use crate::engine::manifest;
-use crate::engine::models::{ModelName, TextBaseline};
-use crate::engine::settings::{ExperimentSettings, JobArgs, JobSettings};
-use crate::error::{Error, Result};
-use crate::pictures::DecodeRule;
-use crate::runs::StatedArgs;
-use crate::runs::run_plan::RunPlan;
-use crate::types::manifests::Identity;
-use crate::types::{AxisLevel, Choices, Condition, Decides, Digest, Family, Question, SetLight, Truths, View};
+use darkqa_ask::{Constrain, PromptSet, Wording};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::Identity;
+use darkqa_base::types::{AxisLevel, Choices, Condition, Decides, Digest, Family, Question, SetLight, Truths, View};
+use darkqa_data::{BankArgs, DataArgs, DataSource, Dataset, DecodeArgs, SceneArgs, SelectionArgs, SetArgs};
+use darkqa_engine::images::recipes::Recipe;
+use darkqa_engine::images::trials::{ASK, QuestionBank, rules};
+use darkqa_engine::manifest;
+use darkqa_engine::models::{ModelName, TextBaseline};
+use darkqa_engine::settings::{ExperimentSettings, JobArgs, JobSettings};
+use darkqa_pictures::DecodeRule;
 use darkqa_questions::rules::Rules;
+use darkqa_runs::StatedArgs;
+use darkqa_runs::run_plan::RunPlan;
 
 /// The flags of an evaluation, by help heading.
 #[derive(Debug, Args)]
@@ -477,7 +477,7 @@ mod tests {
     use std::collections::{BTreeMap, BTreeSet};
 
     use super::*;
-    use crate::types::{Evidence, Family, FrameId, QuestionId};
+    use darkqa_base::types::{Evidence, Family, FrameId, QuestionId};
 
     fn question(id: usize) -> Question {
         let texts = ["a", "b", "c"].map(str::to_owned).to_vec();

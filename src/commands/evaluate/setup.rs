@@ -10,26 +10,26 @@ use std::sync::Arc;
 
 use super::samples::{OtherRooms, Sample, Selection};
 use super::settings::{Evaluation, plan_identity};
-use crate::ask::{Model, Random};
-use crate::data::Dataset;
-use crate::engine::dark_already;
-use crate::engine::images::enhancement::evenly_spaced_indices;
-use crate::engine::images::frames::{Source, first_question_per_frame, inspect_all, photographs};
-use crate::engine::images::progress::Progress;
-use crate::engine::images::recipes::Recipe;
-use crate::engine::images::trials::{
+use darkqa_ask::{Model, Random};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::PartPlace;
+use darkqa_base::types::{Condition, Control, Digest, Question, QuestionId, SetLight, TreatmentSet};
+use darkqa_data::Dataset;
+use darkqa_engine::dark_already;
+use darkqa_engine::images::enhancement::evenly_spaced_indices;
+use darkqa_engine::images::frames::{Source, first_question_per_frame, inspect_all, photographs};
+use darkqa_engine::images::progress::Progress;
+use darkqa_engine::images::recipes::Recipe;
+use darkqa_engine::images::trials::{
     QuestionBank, check_enhanced, conditions, open_data, open_without_generating, select,
 };
-use crate::engine::models::{self, ModelName, ModelUnderTest};
-use crate::engine::observer::{Observer, RoomNet};
-use crate::engine::settings::JobSettings;
-use crate::error::{Error, Result};
-use crate::runs::shard_records::shard_questions;
-use crate::types::manifests::PartPlace;
-use crate::types::{Condition, Control, Digest, Question, QuestionId, SetLight, TreatmentSet};
+use darkqa_engine::models::{self, ModelName, ModelUnderTest};
+use darkqa_engine::observer::{Observer, RoomNet};
+use darkqa_engine::settings::JobSettings;
 use darkqa_enhance::{FRAMES, ModelFile};
 use darkqa_questions::observer::is_in_rulebook;
 use darkqa_questions::rules::Rules;
+use darkqa_runs::shard_records::shard_questions;
 use darkqa_score::suggested_scenes::SuggestedScenes;
 
 /// Data and models of an evaluation, opened and checked. Nothing has been asked or written yet.

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use crate::data::import::recording::Encoding;
-use crate::files::{entries, open};
-use crate::types::shell_word;
+use darkqa_base::files::{entries, open};
+use darkqa_base::types::shell_word;
+use darkqa_data::import::recording::Encoding;
 
 /// Kind of a file or folder, by its first bytes or the files in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -8,18 +8,18 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
-use crate::data::frame_folder::{self, FrameOutput};
-use crate::data::import::recording::{
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::text::counted;
+use darkqa_base::types::text::excerpt;
+use darkqa_base::types::{DepthNote, FrameId, Labels, Pixels, Rgb, Rgb16Image};
+use darkqa_data::frame_folder::{self, FrameOutput};
+use darkqa_data::import::recording::{
     Channel, ChannelContent, ForeignData, GreyBlocks, ImageMessage, MessageImage, Nanoseconds, Place, seconds,
 };
-use crate::engine::images::frames::InputTally;
-use crate::error::{Error, Result};
-use crate::pictures::ImageFile;
-use crate::pictures::decode_rule::DecodeRule;
-use crate::pictures::raw_image::{RawPixels, is_yuv};
-use crate::types::text::counted;
-use crate::types::text::excerpt;
-use crate::types::{DepthNote, FrameId, Labels, Pixels, Rgb, Rgb16Image};
+use darkqa_engine::images::frames::InputTally;
+use darkqa_pictures::ImageFile;
+use darkqa_pictures::decode_rule::DecodeRule;
+use darkqa_pictures::raw_image::{RawPixels, is_yuv};
 
 /// Maximum size of the frames waiting to be written, in bytes (chosen). Writing needs two to three times as much
 /// memory.
@@ -201,7 +201,7 @@ impl<'a> FrameWriter<'a> {
             FrameSource::Message { channel, bytes } => self.encode_message(frame, channel, bytes)?,
             FrameSource::File(bytes) => self.encode_file(frame, bytes.clone(), "unknown")?,
             FrameSource::Image(image) => EncodedFrame {
-                bytes: crate::pictures::png(image).map_err(|e| e.to_string())?,
+                bytes: darkqa_pictures::png(image).map_err(|e| e.to_string())?,
                 ending: "png",
                 size: (image.width(), image.height()),
                 is_turned: false,

@@ -11,15 +11,15 @@ use super::frame_writer::summary;
 use super::lerobot_frames::EpisodeImport;
 use super::mcap_files::slug;
 use super::recording::check_output;
-use crate::data::RootArgs;
-use crate::data::import::lerobot::{Camera, LeRobotSet};
-use crate::data::import::recording::SamplingArgs;
-use crate::engine::images::progress::Progress;
-use crate::engine::images::workers::ThreadArgs;
-use crate::error::{Error, Result};
-use crate::runs::Outcome;
-use crate::types::Decides;
-use crate::types::text::counted;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Decides;
+use darkqa_base::types::text::counted;
+use darkqa_data::RootArgs;
+use darkqa_data::import::lerobot::{Camera, LeRobotSet};
+use darkqa_data::import::recording::SamplingArgs;
+use darkqa_engine::images::progress::Progress;
+use darkqa_engine::images::workers::ThreadArgs;
+use darkqa_runs::Outcome;
 
 /// The flags of `import lerobot`.
 #[derive(Debug, Args)]

@@ -8,17 +8,17 @@ use serde_json::{Map, Value, json};
 
 use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter};
 use super::mcap_files::slug;
-use crate::data::ParquetColumns;
-use crate::data::import::lerobot::{Camera, CameraImages, DataRow, Episode, FilePlace, LeRobotSet};
-use crate::data::import::recording::video::Video;
-use crate::data::import::recording::{GreyBlocks, Nanoseconds, Place, Sampler, SamplingArgs, seconds};
-use crate::engine::images::progress::{Progress, StepBar};
-use crate::engine::images::workers::pool;
-use crate::error::{Error, Result};
-use crate::pictures::ImageFile;
-use crate::pictures::decode_rule::DecodeRule;
-use crate::types::Rgb;
-use crate::types::text::counted;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Rgb;
+use darkqa_base::types::text::counted;
+use darkqa_data::ParquetColumns;
+use darkqa_data::import::lerobot::{Camera, CameraImages, DataRow, Episode, FilePlace, LeRobotSet};
+use darkqa_data::import::recording::video::Video;
+use darkqa_data::import::recording::{GreyBlocks, Nanoseconds, Place, Sampler, SamplingArgs, seconds};
+use darkqa_engine::images::progress::{Progress, StepBar};
+use darkqa_engine::images::workers::pool;
+use darkqa_pictures::ImageFile;
+use darkqa_pictures::decode_rule::DecodeRule;
 
 /// Maximum number of frames of an import (chosen).
 const MAX_FRAMES: usize = 5_000_000;
@@ -314,7 +314,7 @@ impl<'a> EpisodeImport<'a> {
         let (mut next, mut missing, mut first_missing) = (0, 0, None);
         let mut end = None;
         while next < rows.len() {
-            let frame = match frames.next() {
+            let frame = match frames.next_frame() {
                 Ok(Some(frame)) => frame,
                 Ok(None) => break,
                 Err(e @ Error::Usage { .. }) => return Err(e),

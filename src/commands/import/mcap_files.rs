@@ -15,19 +15,19 @@ use serde_json::{Map, Value};
 
 use super::conversion::{conversion, video_commands};
 use super::frame_writer::COPIED;
-use crate::data::Root;
-use crate::data::import::recording::{
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::open;
+use darkqa_base::types::Intrinsics;
+use darkqa_base::types::text::counted;
+use darkqa_data::Root;
+use darkqa_data::import::recording::{
     CameraInfo, Exposure, FileImage, ForeignData, McapReader, Nanoseconds, Overview, TopicOverview, intrinsics_names,
 };
-use crate::engine::images::progress::Progress;
-use crate::error::{Error, Result};
-use crate::files::open;
-use crate::pictures::ImageFile;
-use crate::pictures::decode_rule::DecodeRule;
-use crate::report::text::words::first_names;
-use crate::runs::Outcome;
-use crate::types::Intrinsics;
-use crate::types::text::counted;
+use darkqa_engine::images::progress::Progress;
+use darkqa_pictures::ImageFile;
+use darkqa_pictures::decode_rule::DecodeRule;
+use darkqa_report::text::words::first_names;
+use darkqa_runs::Outcome;
 
 /// Replaces folders by the MCAP files in them, in the order of their numbers.
 pub(super) fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {

@@ -15,19 +15,19 @@ use super::mcap_files::{
     Cameras, FrameExposures, MAX_NAMED, MessageTimes, drive_name, files, listing, no_images, open_reader, overview,
     slug, total_bytes, warn_of_unread,
 };
-use crate::data::import::recording::{
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Decides;
+use darkqa_base::types::flags::positive;
+use darkqa_base::types::text::counted;
+use darkqa_data::import::recording::{
     CameraInfo, ChannelContent, Encoding, Event, ImageMessage, MAX_MESSAGE_BYTES, McapReader, MessageHeader,
     Nanoseconds, Overview, Sampler, SamplingArgs, Stretches, TopicClock, TopicOverview, camera_name, camera_of_info,
     is_without_image, seconds, stamp,
 };
-use crate::engine::images::progress::{Progress, StepBar};
-use crate::engine::images::workers::{ThreadArgs, pool};
-use crate::error::{Error, Result};
-use crate::report::text::words::first_names;
-use crate::runs::Outcome;
-use crate::types::Decides;
-use crate::types::flags::positive;
-use crate::types::text::counted;
+use darkqa_engine::images::progress::{Progress, StepBar};
+use darkqa_engine::images::workers::{ThreadArgs, pool};
+use darkqa_report::text::words::first_names;
+use darkqa_runs::Outcome;
 
 /// Number of bytes at the start of a message that contain its time stamp.
 const STAMP_BYTES: u64 = 64;
@@ -241,7 +241,7 @@ impl<'a> Import<'a> {
         let place = path.display();
         let mut megabytes = 0;
         let mut last = None;
-        while let Some(event) = reader.next() {
+        while let Some(event) = reader.next_event() {
             match event {
                 Event::Message(message) => {
                     self.process(&mut reader, &message);

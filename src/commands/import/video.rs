@@ -9,13 +9,13 @@ use serde_json::{Map, json};
 use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, summary};
 use super::mcap_files::drive_name;
 use super::recording::{DriveArgs, warn_of_missed};
-use crate::data::import::recording::video::{Video, VideoFrames};
-use crate::data::import::recording::{GreyBlocks, SamplingArgs, Stretches, TopicClock, seconds};
-use crate::engine::images::progress::Progress;
-use crate::engine::images::workers::pool;
-use crate::error::{Error, Result};
-use crate::runs::Outcome;
-use crate::types::Decides;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Decides;
+use darkqa_data::import::recording::video::{Video, VideoFrames};
+use darkqa_data::import::recording::{GreyBlocks, SamplingArgs, Stretches, TopicClock, seconds};
+use darkqa_engine::images::progress::Progress;
+use darkqa_engine::images::workers::pool;
+use darkqa_runs::Outcome;
 
 /// The flags of `import video`.
 #[derive(Debug, Args)]
@@ -61,7 +61,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
     let mut frames = video.frames(args.sampling.interval())?;
     let (mut seen, mut last, mut problem) = (0, 0.0_f64, None);
     loop {
-        let frame = match frames.next() {
+        let frame = match frames.next_frame() {
             Ok(Some(frame)) => frame,
             Ok(None) => break,
             Err(e @ Error::Usage { .. }) => return Err(e),

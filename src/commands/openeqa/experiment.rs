@@ -11,30 +11,30 @@ use serde_json::{Value, json};
 
 use super::record::OpenItem;
 use super::setup::OpenSetup;
-use crate::ask::ImagePlaces;
-use crate::ask::prompts::{blind, judge_prompt, vision};
-use crate::data::openeqa::OpenQuestion;
-use crate::engine::costs::text_tokens;
-use crate::engine::experiment::{ExpectedRequest, Experiment};
-use crate::engine::images::frames::{Frames, Source};
-use crate::engine::images::recipes::Recipe;
-use crate::engine::images::trials::{Item as _, Prompt, SourcePlan, Trial, TrialGroup};
-use crate::engine::key_facts::KeyFacts;
-use crate::engine::manifest;
-use crate::engine::models::{ModelUnderTest, asked_in};
-use crate::engine::settings::JobSettings;
-use crate::error::Result;
-use crate::report::joined::written;
-use crate::runs::mark_index::{JUDGE, PROTOCOL};
-use crate::runs::predictions::{AnswerState, predictions};
-use crate::runs::stored::StoredRun;
-use crate::runs::{Outcome, StdoutFormat};
-use crate::store::Store;
-use crate::types::manifests::{Columns, Identity, JUDGES, PartPlace};
-use crate::types::{
+use darkqa_ask::ImagePlaces;
+use darkqa_ask::prompts::{blind, judge_prompt, vision};
+use darkqa_base::error::Result;
+use darkqa_base::types::manifests::{Columns, Identity, JUDGES, PartPlace};
+use darkqa_base::types::{
     Condition, Digest, Evidence, Family, FrameId, OpenDetail, QuestionId, Record, RunQuestion, TrialKey, View,
 };
+use darkqa_data::openeqa::OpenQuestion;
+use darkqa_engine::costs::text_tokens;
+use darkqa_engine::experiment::{ExpectedRequest, Experiment};
+use darkqa_engine::images::frames::{Frames, Source};
+use darkqa_engine::images::recipes::Recipe;
+use darkqa_engine::images::trials::{Item as _, Prompt, SourcePlan, Trial, TrialGroup};
+use darkqa_engine::key_facts::KeyFacts;
+use darkqa_engine::manifest;
+use darkqa_engine::models::{ModelUnderTest, asked_in};
+use darkqa_engine::settings::JobSettings;
+use darkqa_report::joined::written;
+use darkqa_runs::mark_index::{JUDGE, PROTOCOL};
+use darkqa_runs::predictions::{AnswerState, predictions};
+use darkqa_runs::stored::StoredRun;
+use darkqa_runs::{Outcome, StdoutFormat};
 use darkqa_score::choice::llm_match::Protocol;
+use darkqa_store::Store;
 
 /// A typical answer, for estimating the length of a judge's prompt.
 const ANSWER: &str = "There is a small round table with two chairs next to the window of the living room.";

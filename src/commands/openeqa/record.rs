@@ -9,14 +9,14 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use crate::ask::Query;
-use crate::data::openeqa::OpenQuestion;
-use crate::engine::images::trials::{Item, Stimulus, Trial};
-use crate::error::{Error, Result};
-use crate::files;
-use crate::pictures::Payload;
-use crate::report::text::words::first_names;
-use crate::types::{Decides, ExposureFacts, OpenDetail, Record, Step, WalkFacts};
+use darkqa_ask::Query;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::{Decides, ExposureFacts, OpenDetail, Record, Step, WalkFacts};
+use darkqa_data::openeqa::OpenQuestion;
+use darkqa_engine::images::trials::{Item, Stimulus, Trial};
+use darkqa_pictures::Payload;
+use darkqa_report::text::words::first_names;
 
 /// The subject of one trial.
 #[derive(Debug, Clone)]

@@ -10,17 +10,17 @@ use std::sync::Arc;
 use clap::{Arg, Args};
 
 use super::record::OpenSelectionArgs;
-use crate::ask::{AccessArgs, KeyHeader, Parameters, Server, SettingsOrigin, Temperature};
-use crate::data::{DecodeArgs, RootArgs};
-use crate::engine::batch::{BatchFileArgs, BatchRunArgs};
-use crate::engine::images::frames::WalkArgs;
-use crate::engine::models::ModelName;
-use crate::engine::reply_checks::Continuation;
-use crate::engine::settings::{ExperimentSettings, JobArgs, JobSettings};
-use crate::error::{Error, Result};
-use crate::pictures::DecodeRule;
-use crate::types::Decides;
-use crate::types::manifests::JUDGES;
+use darkqa_ask::{AccessArgs, KeyHeader, Parameters, Server, SettingsOrigin, Temperature};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Decides;
+use darkqa_base::types::manifests::JUDGES;
+use darkqa_data::{DecodeArgs, RootArgs};
+use darkqa_engine::batch::{BatchFileArgs, BatchRunArgs};
+use darkqa_engine::images::frames::WalkArgs;
+use darkqa_engine::models::ModelName;
+use darkqa_engine::reply_checks::Continuation;
+use darkqa_engine::settings::{ExperimentSettings, JobArgs, JobSettings};
+use darkqa_pictures::DecodeRule;
 use darkqa_score::choice::llm_match::Protocol;
 
 /// The flags of `openeqa`.
@@ -331,6 +331,6 @@ impl JudgeArgs {
     }
 }
 
-fn at_judge(e: crate::error::Error) -> crate::error::Error {
+fn at_judge(e: darkqa_base::error::Error) -> darkqa_base::error::Error {
     e.at("the judge")
 }

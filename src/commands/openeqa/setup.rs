@@ -11,24 +11,24 @@ use serde_json::Value;
 
 use super::record::{MAX_NAMED, detail, select};
 use super::settings::{AnswersFile, Judge, OpenEqa, OpenTask};
-use crate::ask::Parameters;
-use crate::data::openeqa::{self, OpenQuestion};
-use crate::engine::images::frames::{Source, WalkFolder};
-use crate::engine::images::progress::Progress;
-use crate::engine::images::recipes::Recipe;
-use crate::engine::images::trials::{check_enhanced, conditions};
-use crate::engine::models::{self, ModelUnderTest};
-use crate::error::{Error, Result};
-use crate::files;
-use crate::report::text::words::first_names;
-use crate::runs::shard_records::shard_questions;
-use crate::types::degradations::Kind;
-use crate::types::manifests::PartPlace;
-use crate::types::text::counted;
-use crate::types::{
+use darkqa_ask::Parameters;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::degradations::Kind;
+use darkqa_base::types::manifests::PartPlace;
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{
     Condition, Degradation, Digest, FrameId, KindSet, OpenDetail, QuestionId, Record, Step, TrialKey, Via, View,
 };
+use darkqa_data::openeqa::{self, OpenQuestion};
+use darkqa_engine::images::frames::{Source, WalkFolder};
+use darkqa_engine::images::progress::Progress;
+use darkqa_engine::images::recipes::Recipe;
+use darkqa_engine::images::trials::{check_enhanced, conditions};
+use darkqa_engine::models::{self, ModelUnderTest};
 use darkqa_enhance::ModelFile;
+use darkqa_report::text::words::first_names;
+use darkqa_runs::shard_records::shard_questions;
 
 /// Data and models of an evaluation by open questions, opened and checked. Nothing has been asked or written yet.
 pub(super) struct OpenSetup<'a> {

@@ -14,13 +14,13 @@ use std::sync::{Mutex, PoisonError};
 
 use serde::Deserialize;
 
-use crate::data::Dataset;
-use crate::error::{Error, Result};
-use crate::files::{self, write};
-use crate::report::questions::{ReviewItem, page};
-use crate::types::{Digest, Family, FrameId, QuestionId};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{self, write};
+use darkqa_base::types::{Digest, Family, FrameId, QuestionId};
+use darkqa_data::Dataset;
 use darkqa_questions::GeneratedQuestion;
 use darkqa_questions::statistics::FrameStatistics;
+use darkqa_report::questions::{ReviewItem, page};
 use darkqa_score::answers::record::{Check, CheckFinding, Checks};
 
 /// A line of a file of verdicts.

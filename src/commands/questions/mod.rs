@@ -15,22 +15,18 @@ use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::data::{Dataset, FolderArgs, open_frames, open_images};
-use crate::engine::images::frames::InputTally;
-use crate::engine::images::progress::Progress;
-use crate::engine::images::trials::{note_built_in_families, rules};
-use crate::engine::images::workers::{ThreadArgs, pool};
-use crate::error::{Error, Result};
-use crate::files::{self, write};
-use crate::report;
-use crate::report::questions::AppearanceComparison;
-use crate::runs::Outcome;
-use crate::runs::resolved_shard::{keep_shard, shard_from_flag};
-use crate::runs::shard::Shard;
-use crate::types::questions::FAMILIES;
-use crate::types::text::{counted, plural};
-use crate::types::{Decides, Digest, Evidence, Family, FrameId, Labels, QuestionId, shell_word};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{self, write};
+use darkqa_data::{Dataset, FolderArgs, open_frames, open_images};
+use darkqa_engine::images::frames::InputTally;
+use darkqa_engine::images::progress::Progress;
+use darkqa_engine::images::trials::{note_built_in_families, rules};
+use darkqa_engine::images::workers::{ThreadArgs, pool};
+
 use checked::StatisticsCache;
+use darkqa_base::types::questions::FAMILIES;
+use darkqa_base::types::text::{counted, plural};
+use darkqa_base::types::{Decides, Digest, Evidence, Family, FrameId, Labels, QuestionId, shell_word};
 use darkqa_questions::appearance::FrameAppearance;
 use darkqa_questions::balance::BalanceMode;
 use darkqa_questions::colors::Palette;
@@ -41,6 +37,10 @@ use darkqa_questions::rules::Rules;
 use darkqa_questions::statistics::{self, FrameStatistics, measure, unknown_labels};
 use darkqa_questions::summary::QuestionSummary;
 use darkqa_questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
+use darkqa_report::questions::AppearanceComparison;
+use darkqa_runs::Outcome;
+use darkqa_runs::resolved_shard::{keep_shard, shard_from_flag};
+use darkqa_runs::shard::Shard;
 
 /// The flags of `questions`.
 #[derive(Debug, Args)]
@@ -234,7 +234,7 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
     }
     let summary = QuestionSummary::new(&frames, &generated, &request, failed);
     let comparison = settings.comparison(&dataset, progress)?;
-    let json = report::questions::json(&summary, &verdicts.checks, comparison.as_ref())?;
+    let json = darkqa_report::questions::json(&summary, &verdicts.checks, comparison.as_ref())?;
     if let Some(folder) = &args.stats {
         write_statistics(folder, &summary, &json)?;
     }
@@ -247,16 +247,16 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         return Ok(Outcome::text(status, json));
     }
     let looks = comparison.as_ref().map_or_else(String::new, AppearanceComparison::table);
-    let table = report::questions::table(&summary);
-    let checks = report::questions::text(&verdicts.checks);
+    let table = darkqa_report::questions::table(&summary);
+    let checks = darkqa_report::questions::text(&verdicts.checks);
     let output = format!("{table}{looks}{checks}{}\n", args.out.display());
     Ok(Outcome::wrote(&args.out, status, output))
 }
 
 /// Writes the statistics into a folder as JSON, CSV and SVG.
 fn write_statistics(folder: &Path, summary: &QuestionSummary, json: &str) -> Result<()> {
-    let csv = report::questions::csv(summary)?;
-    let figure = report::questions::figure(summary)?;
+    let csv = darkqa_report::questions::csv(summary)?;
+    let figure = darkqa_report::questions::figure(summary)?;
     write(&folder.join("statistics.json"), json.as_bytes())?;
     write(&folder.join("statistics.csv"), &csv)?;
     write(&folder.join("statistics.svg"), figure.as_bytes())

@@ -12,18 +12,18 @@ use clap::Args;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use crate::data::pairs::Pair;
-use crate::data::{DecodeArgs, RootArgs};
-use crate::engine::images::frames::InputTally;
-use crate::engine::images::progress::Progress;
-use crate::engine::images::workers::ThreadArgs;
-use crate::error::{Error, Result};
-use crate::pictures::ImageFile;
-use crate::report::realism::LeftOut;
-use crate::types::{Decides, FrameId, Pixels, ProfileName, Rgb};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::{Decides, FrameId, Pixels, ProfileName, Rgb};
+use darkqa_data::pairs::Pair;
+use darkqa_data::{DecodeArgs, RootArgs};
+use darkqa_engine::images::frames::InputTally;
+use darkqa_engine::images::progress::Progress;
+use darkqa_engine::images::workers::ThreadArgs;
 use darkqa_light::{
     CameraModel, CameraState, CleanRaw, Coupling, NoiseKey, Sampling, SensorArgs, SensorSettings, Synthesis,
 };
+use darkqa_pictures::ImageFile;
+use darkqa_report::realism::LeftOut;
 use darkqa_score::photographs::realism::gain::{GAINS, GainFit, LADDER_STEPS, PairFit, ProfileFit, ladder};
 use darkqa_score::photographs::realism::residual::{Bins, EmptyBins};
 use darkqa_score::photographs::realism::smooth::SmoothBlocks;

@@ -33,17 +33,17 @@ use hyper_util::server::graceful::GracefulShutdown;
 use tokio::runtime;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use crate::ask::{Call, Message, Model, Query, Random};
-use crate::data::{self, DataSource, RootArgs};
-use crate::engine::images::progress::Progress;
-use crate::engine::interrupt::Interrupt;
-use crate::engine::observer::Observer;
-use crate::error::{Error, Result};
-use crate::runs::Outcome;
-use crate::types::manifests::Status;
-use crate::types::{Choices, Decides, Digest, Evidence, Family, FrameId, Question, QuestionId};
 use completion::{Completion, MemoryBound, RequestFault};
+use darkqa_ask::{Call, Message, Model, Query, Random};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::Status;
+use darkqa_base::types::{Choices, Decides, Digest, Evidence, Family, FrameId, Question, QuestionId};
+use darkqa_data::{DataSource, RootArgs};
+use darkqa_engine::images::progress::Progress;
+use darkqa_engine::interrupt::Interrupt;
+use darkqa_engine::observer::Observer;
 use darkqa_questions::rules::Rules;
+use darkqa_runs::Outcome;
 use request::{AskedQuestion, FrameMatcher, MAX_PIXELS, ServedQuestion};
 
 /// Maximum number of bytes of all bodies in flight (chosen). A body takes up to three times its size until it is
@@ -61,7 +61,7 @@ const COMPLETIONS: &str = "/v1/chat/completions";
 #[derive(Debug, Args)]
 pub(crate) struct ServeArgs {
     /// The frames that the observer knows: rooms:frames=N,seed=N,size=WIDTHxHEIGHT, or a folder of frames with maps
-    #[arg(long, value_name = "DIR|rooms:…", value_parser = data::parse_data_source, default_value_t, add = Decides::Reply)]
+    #[arg(long, value_name = "DIR|rooms:…", value_parser = darkqa_data::parse_data_source, default_value_t, add = Decides::Reply)]
     pub data: DataSource,
     /// The port on 127.0.0.1, 0 for any that is free
     #[arg(long, value_name = "N", default_value_t = 8089, add = Decides::Nothing)]

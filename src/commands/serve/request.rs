@@ -19,12 +19,12 @@ use serde::Deserialize;
 use tokio::sync::OwnedSemaphorePermit;
 
 use super::completion::{MemoryBound, ReplyForm, RequestFault};
-use crate::data::Dataset;
-use crate::engine::images::progress::Progress;
-use crate::error::Result;
-use crate::pictures::{DecodeRule, ImageFile, Payload, PayloadFormat};
-use crate::types::questions::letter;
-use crate::types::{FrameId, Rgb};
+use darkqa_base::error::Result;
+use darkqa_base::types::questions::letter;
+use darkqa_base::types::{FrameId, Rgb};
+use darkqa_data::Dataset;
+use darkqa_engine::images::progress::Progress;
+use darkqa_pictures::{DecodeRule, ImageFile, Payload, PayloadFormat};
 
 /// Maximum number of pixels of an image, and of all images in flight (chosen). Decoded and encoded again, a pixel takes
 /// 10 to 20 bytes.

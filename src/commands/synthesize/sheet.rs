@@ -1,5 +1,5 @@
 //! The figures of `synthesize --sheet` ([`SheetKind`]) and the facts that determine them ([`SheetRecipe`]). They are drawn
-//! by [`crate::report::charts::sheet`].
+//! by [`darkqa_report::charts::sheet`].
 
 use std::fmt;
 
@@ -8,16 +8,16 @@ use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::data::Picture;
-use crate::engine::images::frame_work::FrameWork;
-use crate::engine::images::stored::ImageOrigin;
-use crate::error::Result;
-use crate::report::charts::sheet::{self, LevelBlock, LevelImage, LevelRow, Signal};
-use crate::types::degradations::{Axis, Kind};
-use crate::types::{AxisLevel, Degradation, FrameId, Rgb, Severity, Variant};
+use darkqa_base::error::Result;
+use darkqa_base::types::degradations::{Axis, Kind};
+use darkqa_base::types::{AxisLevel, Degradation, FrameId, Rgb, Severity, Variant};
+use darkqa_data::Picture;
+use darkqa_engine::images::frame_work::FrameWork;
+use darkqa_engine::images::stored::ImageOrigin;
 use darkqa_light::raw::noise::{self, Term};
 use darkqa_light::raw::{Bayer, unprocess_with_headroom};
 use darkqa_light::{Coupling, Draws, LightSettings, NoiseKey, Synthesis, version};
+use darkqa_report::charts::sheet::{self, LevelBlock, LevelImage, LevelRow, Signal};
 
 /// The kind of a figure of one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]

@@ -12,17 +12,17 @@ use clap::Args;
 use ndarray::Array2;
 use serde_json::Value;
 
-use crate::data::maps::{DepthFile, millimetres};
-use crate::error::{Error, Result};
-use crate::files::{bytes, entries, text};
-use crate::labels;
-use crate::pictures::decode_rule::MAX_PIXELS;
-use crate::pictures::hdf5::Hdf5Array;
-use crate::pictures::npy::Npy;
-use crate::pictures::raw_png::{RawPng, SampleForm};
-use crate::pictures::{DecodeRule, ImageFile};
-use crate::types::flags::positive;
-use crate::types::{Decides, DepthKind, Intrinsics, Labels, Rgb, SegmentName, Segmentation};
+use crate::maps::{DepthFile, millimetres};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{bytes, entries, text};
+use darkqa_base::labels;
+use darkqa_base::types::flags::positive;
+use darkqa_base::types::{Decides, DepthKind, Intrinsics, Labels, Rgb, SegmentName, Segmentation};
+use darkqa_pictures::decode_rule::MAX_PIXELS;
+use darkqa_pictures::hdf5::Hdf5Array;
+use darkqa_pictures::npy::Npy;
+use darkqa_pictures::raw_png::{RawPng, SampleForm};
+use darkqa_pictures::{DecodeRule, ImageFile};
 
 /// File name endings of maps.
 pub(super) const MAPS: [&str; 4] = [".npy", ".hdf5", ".h5", ".png"];
@@ -211,7 +211,7 @@ pub(super) fn map_paths(maps: &[(Option<PathBuf>, PathBuf)]) -> impl Iterator<It
 /// Flags that describe the maps and the camera of a data set.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Maps")]
-pub(crate) struct MapArgs {
+pub struct MapArgs {
     /// The label space of the class maps: nyu40, nyu40-1 (from 0, 255 for void; kind nyu), nyu13, mpcat40, ade150, or a
     /// classes.json; default: that of the kind of data set
     #[arg(long, value_name = "NAME|FILE", add = Decides::Pixels)]
@@ -238,7 +238,7 @@ fn degrees(text: &str) -> Result<f64, String> {
 
 /// A frame of a data set; its maps are not read yet.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct ListedFrame {
+pub struct ListedFrame {
     pub scene: String,
     /// Name of the frame in its scene.
     pub frame: String,
@@ -265,7 +265,7 @@ impl ListedFrame {
 
 /// Maps of a frame, in the size of its image.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct FrameMaps {
+pub struct FrameMaps {
     /// Depth in millimetres; 0 for no depth.
     pub depth: Option<Array2<u32>>,
     /// Class numbers of the label space.
@@ -278,7 +278,7 @@ pub(crate) struct FrameMaps {
 
 /// Contents of a data set without its maps.
 #[derive(Debug, Default)]
-pub(crate) struct Listing {
+pub struct Listing {
     /// The frames, sorted by scene and name.
     pub frames: Vec<ListedFrame>,
     /// Meaning of the numbers in semantic maps.
@@ -314,7 +314,7 @@ impl Listing {
 }
 
 /// An open data set of any kind.
-pub(crate) trait Adapter: fmt::Debug + Sync {
+pub trait Adapter: fmt::Debug + Sync {
     /// Contents of the data set without its maps.
     fn listing(&self) -> &Listing;
 

@@ -15,11 +15,11 @@ use serde::Deserialize;
 use super::files::{
     Adapter, FrameMaps, IMAGES, ListedFrame, Listing, MAPS, MapArgs, MapFiles, files, first_folder, folders, labels,
 };
-use crate::data::frames::ImagePaths;
-use crate::data::{Dataset, ImageSource, open_frames};
-use crate::error::{Error, Result};
-use crate::files::{entries, json_lines};
-use crate::types::{DepthKind, Frame, FrameId, Labels, Rgb, Segmentation};
+use crate::frames::ImagePaths;
+use crate::{Dataset, ImageSource, open_frames};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{entries, json_lines};
+use darkqa_base::types::{DepthKind, Frame, FrameId, Labels, Rgb, Segmentation};
 
 /// Names of the folders of images, depth, classes and segments.
 const RGB: [&str; 6] = ["rgb", "image", "images", "color", "img", "RGB"];
@@ -55,7 +55,7 @@ impl Folder {
         let own_labels = folder.join("classes.json");
         let (labels, labels_file) = match labels(args)? {
             Some(labels) => (labels, None),
-            None if own_labels.is_file() => (crate::labels::read(&own_labels)?, Some(own_labels)),
+            None if own_labels.is_file() => (darkqa_base::labels::read(&own_labels)?, Some(own_labels)),
             None => {
                 let problem = "the label space of the class maps is missing; nyu40, nyu13, mpcat40, ade150 or the path of a classes.json expected";
                 return Err(Error::usage("--labels", problem));
@@ -239,7 +239,7 @@ const MAX_NAMED_KINDS: usize = 8;
 
 /// Unread files by kind: the name of their folder and their extension.
 #[derive(Debug, Default, PartialEq, Eq)]
-pub(crate) struct UnreadFiles(BTreeMap<String, FilesOfKind>);
+pub struct UnreadFiles(BTreeMap<String, FilesOfKind>);
 
 #[derive(Debug, PartialEq, Eq)]
 struct FilesOfKind {
@@ -293,7 +293,7 @@ impl UnreadFiles {
     }
 
     /// Line with the unread files, the most frequent kinds first; empty if there are none.
-    pub(crate) fn line(&self) -> String {
+    pub fn line(&self) -> String {
         if self.0.is_empty() {
             return String::new();
         }

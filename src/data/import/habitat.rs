@@ -35,10 +35,10 @@ use super::files::{
     Adapter, FrameMaps, IMAGES, ListedFrame, Listing, MapArgs, check_same_size, class_numbers, file_name, files,
     folders, map_paths, read_frame_depth, read_segments,
 };
-use crate::error::{Error, Result};
-use crate::files::{json_lines, text};
-use crate::labels::{UNKNOWN, class_of, class_override};
-use crate::types::{Intrinsics, Rgb, SegmentName};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{json_lines, text};
+use darkqa_base::labels::{UNKNOWN, class_of, class_override};
+use darkqa_base::types::{Intrinsics, Rgb, SegmentName};
 
 /// Minimum share of a frame's named pixels, in percent, in the region that gives the frame its room type (chosen).
 const MIN_REGION_PERCENT: u64 = 60;
@@ -445,7 +445,7 @@ fn parse_replica(text: &str, unlisted: &mut BTreeMap<String, usize>) -> Result<B
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::labels::canonical;
+    use darkqa_base::labels::canonical;
 
     #[test]
     fn names_may_have_commas_and_be_empty() {

@@ -7,8 +7,8 @@
 use std::path::{Path, PathBuf};
 
 use super::files::{Adapter, FrameMaps, ListedFrame, Listing, MapArgs, MapFiles, file_name, files, folders, labels};
-use crate::error::Result;
-use crate::types::{DepthKind, Rgb};
+use darkqa_base::error::Result;
+use darkqa_base::types::{DepthKind, Rgb};
 
 /// Horizontal field of view of most scenes, π/3, in degrees.
 const HFOV: f64 = 60.0;

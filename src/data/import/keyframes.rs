@@ -5,14 +5,14 @@ use std::num::NonZeroUsize;
 use clap::Args;
 
 use super::files::ListedFrame;
-use crate::error::{Error, Result};
-use crate::types::Decides;
-use crate::types::flags::positive;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Decides;
+use darkqa_base::types::flags::positive;
 
 /// Flags that choose the frames of each scene.
 #[derive(Debug, Clone, Copy, Default, Args)]
 #[command(next_help_heading = "Key frames")]
-pub(crate) struct KeyFrameArgs {
+pub struct KeyFrameArgs {
     /// One frame every N seconds of a scene (DarkQA: 2); default: every frame
     #[arg(long, value_name = "SECONDS", value_parser = positive, conflicts_with = "count", add = Decides::Trials)]
     pub every: Option<f64>,
@@ -27,7 +27,7 @@ pub(crate) struct KeyFrameArgs {
 impl KeyFrameArgs {
     /// Rule for the choice of frames.
     #[must_use]
-    pub(crate) fn selection(&self) -> KeyFrames {
+    pub fn selection(&self) -> KeyFrames {
         match (self.every, self.count) {
             (Some(seconds), _) => KeyFrames::Seconds(seconds),
             (None, Some(count)) => KeyFrames::Count(count.get()),
@@ -38,7 +38,7 @@ impl KeyFrameArgs {
 
 /// Rule for the choice of frames in each scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum KeyFrames {
+pub enum KeyFrames {
     /// All frames of the scene.
     All,
     /// One frame per interval of this many seconds, counted from the first frame (DarkQA: 2).
@@ -54,7 +54,7 @@ pub(crate) enum KeyFrames {
 ///
 /// # Errors
 /// If an interval is given and a frame has no time.
-pub(crate) fn choose(frames: &[ListedFrame], selection: KeyFrames, fps: Option<f64>) -> Result<Vec<ListedFrame>> {
+pub fn choose(frames: &[ListedFrame], selection: KeyFrames, fps: Option<f64>) -> Result<Vec<ListedFrame>> {
     let mut chosen = Vec::new();
     for scene in frames.chunk_by(|a, b| a.scene == b.scene) {
         let mut timed: Vec<ListedFrame> = scene.to_vec();

@@ -25,10 +25,10 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
-use crate::data::{ParquetColumns, Root, cached_snapshot, refuse_lfs_pointer};
-use crate::error::{Error, Result};
-use crate::files::{at_most, entries, json_lines, json_problem};
-use crate::types::text::excerpt;
+use crate::{ParquetColumns, Root, cached_snapshot, refuse_lfs_pointer};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{at_most, entries, json_lines, json_problem};
+use darkqa_base::types::text::excerpt;
 
 /// Files in a chunk if `info.json` does not state it, as in LeRobot.
 const CHUNK_SIZE: u64 = 1000;
@@ -76,20 +76,20 @@ pub(super) struct Info {
 
 /// A camera of a data set: a feature with images.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Camera {
-    pub(crate) name: String,
-    pub(crate) form: CameraImages,
+pub struct Camera {
+    pub name: String,
+    pub form: CameraImages,
     /// True if the images are depth maps, which are not read.
-    pub(crate) is_depth: bool,
+    pub is_depth: bool,
     /// Size and codec as stated, such as `640×480 av1`; may be empty.
-    pub(crate) description: String,
+    pub description: String,
     /// Frames per second of its videos.
-    pub(crate) fps: f64,
+    pub fps: f64,
 }
 
 /// Where the images of a camera are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum CameraImages {
+pub enum CameraImages {
     /// In video files.
     Video,
     /// In the data files, as image files in a column.
@@ -98,7 +98,7 @@ pub(crate) enum CameraImages {
 
 impl CameraImages {
     /// The `dtype` in `info.json`.
-    pub(crate) fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Video => "video",
             Self::Images => "image",
@@ -214,29 +214,29 @@ const MAX_INDEX: f64 = 1e15;
 
 /// Numbers in the path of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct FilePlace {
-    pub(crate) chunk: u64,
+pub struct FilePlace {
+    pub chunk: u64,
     /// Number of the file, which is that of the episode in versions 2.0 and 2.1.
-    pub(crate) file: u64,
+    pub file: u64,
 }
 
 /// The part of a video file that shows an episode.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct VideoPart {
-    pub(crate) place: FilePlace,
+pub struct VideoPart {
+    pub place: FilePlace,
     /// Time of the first frame of the episode in the file, in seconds.
-    pub(crate) from: f64,
+    pub from: f64,
 }
 
 /// An episode.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Episode {
-    pub(crate) index: u32,
+pub struct Episode {
+    pub index: u32,
     /// Number of frames.
-    pub(crate) length: u64,
-    pub(crate) data: FilePlace,
+    pub length: u64,
+    pub data: FilePlace,
     /// Its video of each requested camera; `None` if the set does not state it.
-    pub(crate) videos: Vec<Option<VideoPart>>,
+    pub videos: Vec<Option<VideoPart>>,
 }
 
 /// A line of `meta/episodes.jsonl`.
@@ -329,19 +329,19 @@ impl Layout {
 
 /// A row of a data file: one time of an episode. Small, because there are millions.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct DataRow {
+pub struct DataRow {
     /// Index of the episode.
-    pub(crate) episode: u32,
+    pub episode: u32,
     /// Number in the episode, from 0.
-    pub(crate) frame: u32,
+    pub frame: u32,
     /// Seconds from the start of the episode.
-    pub(crate) time: f64,
+    pub time: f64,
     /// Number of the task.
-    pub(crate) task: Option<u32>,
+    pub task: Option<u32>,
     /// Row group.
-    pub(crate) group: u32,
+    pub group: u32,
     /// Index of the row in its row group.
-    pub(crate) row: u32,
+    pub row: u32,
 }
 
 /// Columns of a data file that are read, in the order of [`DataRow`].
@@ -396,7 +396,7 @@ const MAX_TASK_CHARS: usize = 2_000;
 
 /// A LeRobot data set. Its files are read when they are needed.
 #[derive(Debug)]
-pub(crate) struct LeRobotSet {
+pub struct LeRobotSet {
     folder: PathBuf,
     root: Root,
     info: Info,
@@ -415,7 +415,7 @@ impl LeRobotSet {
     ///
     /// # Errors
     /// If the folder has no description of a supported version.
-    pub(crate) fn open(place: &Path, further: &[PathBuf]) -> Result<Self> {
+    pub fn open(place: &Path, further: &[PathBuf]) -> Result<Self> {
         if !place.is_dir() {
             let problem = format_args!("{}: no such folder", place.display());
             return Err(Error::usage("DIR", problem));
@@ -444,32 +444,32 @@ impl LeRobotSet {
     }
 
     /// Folder of the set, which is a snapshot for a repository in a hub's cache.
-    pub(crate) fn folder(&self) -> &Path {
+    pub fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// The version as stated, such as `v3.0`.
-    pub(crate) fn version(&self) -> &str {
+    pub fn version(&self) -> &str {
         &self.info.version
     }
 
     /// Frames per second of the data.
-    pub(crate) fn fps(&self) -> f64 {
+    pub fn fps(&self) -> f64 {
         self.info.fps
     }
 
     /// Name of the robot, if stated.
-    pub(crate) fn robot(&self) -> Option<&str> {
+    pub fn robot(&self) -> Option<&str> {
         self.info.robot.as_deref()
     }
 
     /// Cameras, sorted by name.
-    pub(crate) fn cameras(&self) -> &[Camera] {
+    pub fn cameras(&self) -> &[Camera] {
         &self.info.cameras
     }
 
     /// Number of features that are no cameras.
-    pub(crate) fn other_features(&self) -> usize {
+    pub fn other_features(&self) -> usize {
         self.info.other_features
     }
 
@@ -477,7 +477,7 @@ impl LeRobotSet {
     ///
     /// # Errors
     /// If a file about episodes is missing or damaged, two episodes have one index, or there are no episodes.
-    pub(crate) fn episodes(&self, cameras: &[&str]) -> Result<Vec<Episode>> {
+    pub fn episodes(&self, cameras: &[&str]) -> Result<Vec<Episode>> {
         let name = self.info.layout.episodes_path();
         let mut episodes = match self.info.layout {
             Layout::V2 => read_lines(&self.file(name)?, &self.info, cameras.len())?,
@@ -526,7 +526,7 @@ impl LeRobotSet {
     ///
     /// # Errors
     /// If the file with the tasks is missing or damaged.
-    pub(crate) fn tasks(&self) -> Result<BTreeMap<u32, String>> {
+    pub fn tasks(&self) -> Result<BTreeMap<u32, String>> {
         let path = self.file(self.info.layout.tasks_path())?;
         if self.info.layout == Layout::V2 {
             let lines = json_lines::<TaskLine>(&path)?;
@@ -560,7 +560,7 @@ impl LeRobotSet {
     ///
     /// # Errors
     /// If the pattern of paths is wrong or leads outside the folder, or the file is missing.
-    pub(crate) fn data_file(&self, place: FilePlace) -> Result<PathBuf> {
+    pub fn data_file(&self, place: FilePlace) -> Result<PathBuf> {
         self.file(&self.fill(&self.info.data_path, "data_path", place, "")?)
     }
 
@@ -568,7 +568,7 @@ impl LeRobotSet {
     ///
     /// # Errors
     /// As [`Self::data_file`].
-    pub(crate) fn video_file(&self, place: FilePlace, camera: &str) -> Result<PathBuf> {
+    pub fn video_file(&self, place: FilePlace, camera: &str) -> Result<PathBuf> {
         let path = self.file(&self.fill(&self.info.video_path, "video_path", place, camera)?)?;
         refuse_lfs_pointer(&path)?;
         Ok(path)
@@ -578,7 +578,7 @@ impl LeRobotSet {
     ///
     /// # Errors
     /// If the file is missing or damaged.
-    pub(crate) fn rows(&self, place: FilePlace, add: impl FnMut(DataRow)) -> Result<usize> {
+    pub fn rows(&self, place: FilePlace, add: impl FnMut(DataRow)) -> Result<usize> {
         read(&self.data_file(place)?, add)
     }
 

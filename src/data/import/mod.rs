@@ -17,9 +17,9 @@ mod files;
 mod folder;
 mod habitat;
 mod hypersim;
-pub(crate) mod keyframes;
-pub(crate) mod lerobot;
-pub(crate) mod recording;
+pub mod keyframes;
+pub mod lerobot;
+pub mod recording;
 mod scannet;
 mod sunrgbd;
 mod thor;
@@ -27,19 +27,19 @@ mod thor;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use crate::data::Root;
-use crate::error::{Error, Result};
-use crate::types::flags::flag_words;
-use crate::types::{Intrinsics, Rgb};
+use crate::Root;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::flags::flag_words;
+use darkqa_base::types::{Intrinsics, Rgb};
 use files::{Listing, SizedCamera, labels};
 use folder::{Folder, NumberOffset};
 
-pub(crate) use files::{Adapter, FrameMaps, ListedFrame, MapArgs};
-pub(crate) use folder::UnreadFiles;
+pub use files::{Adapter, FrameMaps, ListedFrame, MapArgs};
+pub use folder::UnreadFiles;
 
 /// Kind of data set in a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum DataSetKind {
+pub enum DataSetKind {
     /// Renders of habitat-sim: HM3D-Sem, Matterport3D, Replica.
     Habitat,
     /// Frames of ScanNet, extracted.
@@ -63,7 +63,7 @@ flag_words!(DataSetKind);
 ///
 /// # Errors
 /// As [`open`], or if the data sets cannot be combined.
-pub(crate) fn open_all(
+pub fn open_all(
     kind: DataSetKind,
     folders: &[PathBuf],
     args: &MapArgs,
@@ -83,7 +83,7 @@ pub(crate) fn open_all(
 ///
 /// # Errors
 /// If a folder cannot be read.
-pub(crate) fn unread_files(folders: &[PathBuf], adapter: &dyn Adapter) -> Result<UnreadFiles> {
+pub fn unread_files(folders: &[PathBuf], adapter: &dyn Adapter) -> Result<UnreadFiles> {
     let read: BTreeSet<PathBuf> =
         adapter.listing().frames.iter().map(|frame| frame.rgb.clone()).chain(adapter.other_files()).collect();
     let mut unread = UnreadFiles::default();

@@ -16,11 +16,11 @@ use super::files::{
     Adapter, FrameMaps, IMAGES, ListedFrame, Listing, MapArgs, check_same_size, file_name, files, folders, read_depth,
     read_numbers, read_png,
 };
-use crate::error::{Error, Result};
-use crate::files::{bytes, json, text};
-use crate::labels::{UNKNOWN, canonical, class_override, space};
-use crate::pictures::raw_png::SampleForm;
-use crate::types::{Intrinsics, Label, Labels, Rgb};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{bytes, json, text};
+use darkqa_base::labels::{UNKNOWN, canonical, class_override, space};
+use darkqa_base::types::{Intrinsics, Label, Labels, Rgb};
+use darkqa_pictures::raw_png::SampleForm;
 
 /// File name of the table of ScanNet's label numbers.
 const LABEL_TABLE: &str = "scannetv2-labels.combined.tsv";

@@ -18,11 +18,11 @@ use super::files::{
     Adapter, FrameMaps, IMAGES, ListedFrame, Listing, check_same_size, file_name, files, folders, read_numbers,
     read_png,
 };
-use crate::error::{Error, Result};
-use crate::files::{json, text};
-use crate::labels::{canonical, class_of};
-use crate::pictures::raw_png::SampleForm;
-use crate::types::{Intrinsics, Label, Labels, Rgb};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{json, text};
+use darkqa_base::labels::{canonical, class_of};
+use darkqa_base::types::{Intrinsics, Label, Labels, Rgb};
+use darkqa_pictures::raw_png::SampleForm;
 
 /// Depth folders, in order of preference. `depth_bfx` is `depth` with its holes filled, which the toolbox reads
 /// (`depthpath` of its `SUNRGBDMeta`).

@@ -12,10 +12,10 @@ use super::files::{
     Adapter, FrameMaps, IMAGES, ListedFrame, Listing, MapArgs, check_same_size, class_numbers, file_name, files,
     folders, map_paths, read_frame_depth, read_id_image,
 };
-use crate::error::{Error, Result};
-use crate::files::json;
-use crate::labels;
-use crate::types::{Rgb, SegmentName};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::json;
+use darkqa_base::labels;
+use darkqa_base::types::{Rgb, SegmentName};
 
 /// Folder of AI2-THOR scenes.
 #[derive(Debug)]

@@ -7,8 +7,8 @@ use super::choices::is_native_format;
 use super::columns::map::ColumnMap;
 use super::columns::{SetColumn, find_column};
 use super::summary::count;
-use crate::data::ready_made::columns::map::ColumnRole;
-use crate::types::{Question, StrictGroup};
+use crate::ready_made::columns::map::ColumnRole;
+use darkqa_base::types::{Question, StrictGroup};
 
 /// Rule that makes the name of a row's group from its cells.
 #[derive(Debug)]

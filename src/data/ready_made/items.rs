@@ -10,8 +10,8 @@ use super::columns::{ColumnRoles, OptionsInQuestion, QuestionSource, SetColumn};
 use super::omissions::{Omissions, RowOmission};
 use super::pictures::{ImageForm, ImageMarks};
 use super::settings::{SetArgs, SeveralImages};
-use crate::data::ready_made::columns::map::{ColumnRole, split_instructions};
-use crate::types::text::excerpt;
+use crate::ready_made::columns::map::{ColumnRole, split_instructions};
+use darkqa_base::types::text::excerpt;
 
 /// Maximum length of a question or an option, in bytes.
 const MAX_TEXT_BYTES: usize = 16 << 10;

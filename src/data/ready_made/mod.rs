@@ -16,10 +16,10 @@
 mod cells;
 mod choices;
 mod columns;
-pub(crate) mod container;
+pub mod container;
 mod groups;
 mod items;
-pub(crate) mod omissions;
+pub mod omissions;
 mod pictures;
 mod preset;
 mod settings;
@@ -34,14 +34,14 @@ use std::sync::Arc;
 use super::bank::{check_family, unnamed};
 use super::openeqa::ImageSource;
 use super::root::Root;
-use crate::error::{Error, Result};
-use crate::files;
-use crate::types::{Choices, Family, FrameId, Question, SetLight};
 use cells::{Cell, SetRows};
 use choices::{SetQuestion, find_truths, is_native_format};
 use columns::map::{CellFormat, ColumnMap, ColumnRole};
 use columns::{ColumnRoles, FamilySource, ImageColumns, QuestionSource};
 use container::{FileRelation, FoundFiles, SetFile};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::{Choices, Family, FrameId, Question, SetLight};
 use groups::{GroupRule, Groups};
 use items::{InstructionCounts, items, rows_with_images};
 use omissions::{Omissions, RowOmission, omit_contradictions};
@@ -54,8 +54,8 @@ pub(super) use pictures::{EmbeddedImage, SceneNames, Series};
 pub(super) use preset::{is_known as is_known_set, names as known_sets};
 pub(super) use summary::LEFT_OUT;
 
-pub(crate) use container::{Archive, ParquetColumns, cached_snapshot, is_zip_file, refuse_lfs_pointer};
-pub(crate) use omissions::SkipBad;
+pub use container::{Archive, ParquetColumns, cached_snapshot, is_zip_file, refuse_lfs_pointer};
+pub use omissions::SkipBad;
 
 pub use settings::SetArgs;
 
@@ -304,7 +304,7 @@ fn assemble(
 /// With `--skip bad`, leaves out rows whose image is missing or is not an image.
 ///
 /// Without the flag, reading such an image is an error. Rows whose image cannot be decoded are left out later
-/// ([`Dataset::without_unusable`](crate::data::Dataset::without_unusable)).
+/// ([`Dataset::without_unusable`](crate::Dataset::without_unusable)).
 fn omit_unusable_images(context: &SetContext<'_>, set: &mut ParsedSet, frames: &SetFrames<'_>) -> Result<()> {
     if context.args.bad.is_none() {
         return Ok(());

@@ -9,7 +9,7 @@ use super::cells::SetRows;
 use super::columns::map::ColumnMap;
 use super::groups::template_columns;
 use super::settings::{LeaveOut, SetArgs, SeveralImages};
-use crate::data::ready_made::columns::map::normalize;
+use crate::ready_made::columns::map::normalize;
 
 /// Presets in TOML.
 const SETS: &str = include_str!("sets.toml");

@@ -4,8 +4,8 @@ use clap::{Args, ValueEnum};
 
 use super::columns::map::ColumnMap;
 use super::omissions::SkipBad;
-use crate::data::root::RootArgs;
-use crate::types::Decides;
+use crate::root::RootArgs;
+use darkqa_base::types::Decides;
 
 /// Flags for reading a ready-made set.
 #[derive(Debug, Clone, Default, Args)]

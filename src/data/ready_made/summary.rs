@@ -7,8 +7,8 @@ use super::columns::{ColumnRoles, FamilySource, ImageColumns, QuestionSource};
 use super::items::InstructionCounts;
 use super::omissions::{Omissions, RowOmission};
 use super::pictures::Series;
-use crate::data::openeqa::ImageSource;
-use crate::types::{FrameId, Question};
+use crate::openeqa::ImageSource;
+use darkqa_base::types::{FrameId, Question};
 
 /// Facts about a set, for messages and the manifest.
 pub(super) struct Summary<'a> {

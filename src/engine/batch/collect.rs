@@ -10,8 +10,8 @@ use tokio::time::sleep;
 use super::driver::{Driver, Goal, StepOutcome};
 use super::journal::{BatchPart, PartEvent};
 use super::replies::for_each_line;
-use crate::ask::batch_api::{ApiResult, BatchState, RemoteBatch};
-use crate::error::{Error, Result};
+use darkqa_ask::batch_api::{ApiResult, BatchState, RemoteBatch};
+use darkqa_base::error::{Error, Result};
 use darkqa_score::answers::record::Detail;
 
 /// Maximum size of a reply in bytes; chosen: far more than the longest reply of a reasoning model.

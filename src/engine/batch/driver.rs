@@ -15,16 +15,16 @@ use tokio::time::{Instant, sleep};
 use super::file::{SHARE_OF_QUOTA, StoppedModels};
 use super::journal::{BatchPart, Journal, PartEvent, PartFacts, Stage};
 use super::servers::{BatchRunArgs, BatchServers};
-use crate::ask::batch_api::BatchServer;
-use crate::ask::{AskError, BaseUrl, QuotaRefusal};
-use crate::engine::costs::{Budget, InFlightCost, MoneySettings, RunModels};
-use crate::engine::images::progress::Progress;
-use crate::engine::models::ModelUnderTest;
-use crate::error::{Error, Result};
-use crate::store::Store;
-use crate::types::TrialKey;
-use crate::types::manifests::RunManifest;
+use crate::costs::{Budget, InFlightCost, MoneySettings, RunModels};
+use crate::images::progress::Progress;
+use crate::models::ModelUnderTest;
+use darkqa_ask::batch_api::BatchServer;
+use darkqa_ask::{AskError, BaseUrl, QuotaRefusal};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::TrialKey;
+use darkqa_base::types::manifests::RunManifest;
 use darkqa_score::answers::record::Detail;
+use darkqa_store::Store;
 
 /// Maximum wait between two checks of the batches, as a multiple of `--poll`; chosen: 5 minutes with the default of 10
 /// s.

@@ -17,69 +17,69 @@ use sha2::{Digest as _, Sha256};
 use super::BatchFileArgs;
 use super::journal::{Journal, PartFacts, file_name};
 use super::servers::account;
-use crate::ask::{BatchInterface, TokenBound};
-use crate::engine::dark_already;
-use crate::engine::experiment::Experiment;
-use crate::engine::images::recipes::Maker;
-use crate::engine::images::stored::StoredImages;
-use crate::engine::images::timings::Timings;
-use crate::engine::images::trials::{Item, Plan, PreparedGroup, Stimulus, Trial};
-use crate::engine::images::workers::pool;
-use crate::engine::models::ModelUnderTest;
-use crate::engine::open_run::{OpenRun, Remaining, every_model, image_limit, missing_notes, pipeline};
-use crate::error::{Error, Result};
-use crate::files::create_new;
-use crate::runs::outcome::Outcome;
-use crate::store::{BATCH, Store};
-use crate::types::Record;
-use crate::types::manifests::Status;
-use crate::types::text::counted;
+use crate::dark_already;
+use crate::experiment::Experiment;
+use crate::images::recipes::Maker;
+use crate::images::stored::StoredImages;
+use crate::images::timings::Timings;
+use crate::images::trials::{Item, Plan, PreparedGroup, Stimulus, Trial};
+use crate::images::workers::pool;
+use crate::models::ModelUnderTest;
+use crate::open_run::{OpenRun, Remaining, every_model, image_limit, missing_notes, pipeline};
+use darkqa_ask::{BatchInterface, TokenBound};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::create_new;
+use darkqa_base::types::Record;
+use darkqa_base::types::manifests::Status;
+use darkqa_base::types::text::counted;
+use darkqa_runs::outcome::Outcome;
 use darkqa_score::answers::record::Detail;
+use darkqa_store::{BATCH, Store};
 
 /// Extension of a file until it is complete.
 pub(super) const PART: &str = "part";
 
 /// Maximum contents of a file.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct FileLimits {
-    pub(crate) bytes: u64,
-    pub(crate) requests: usize,
+pub struct FileLimits {
+    pub bytes: u64,
+    pub requests: usize,
     /// Expected tokens of all prompts.
-    pub(crate) tokens: f64,
+    pub tokens: f64,
 }
 
 /// The expected tokens and dollars of a request.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct RequestCost {
+pub struct RequestCost {
     /// Tokens of the prompt.
-    pub(crate) tokens: f64,
+    pub tokens: f64,
     /// Expected cost in US dollars; `None` if the model has no known price.
-    pub(crate) dollars: Option<f64>,
+    pub dollars: Option<f64>,
     /// Maximum cost in US dollars; `None` if the model has no known price.
-    pub(crate) most_dollars: Option<f64>,
+    pub most_dollars: Option<f64>,
     /// Maximum number of tokens; `None` if the model has no known price.
-    pub(crate) bound: Option<TokenBound>,
+    pub bound: Option<TokenBound>,
 }
 
 /// Model and endpoint of the files, for the facts of a part.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Destination {
-    pub(crate) model: String,
-    pub(crate) name: String,
-    pub(crate) account: String,
-    pub(crate) base: String,
-    pub(crate) url: String,
+pub struct Destination {
+    pub model: String,
+    pub name: String,
+    pub account: String,
+    pub base: String,
+    pub url: String,
 }
 
 /// Where the requests of a complete file are recorded: in the run, and in the journal if the program submits the file.
-pub(crate) struct Register<'a, D> {
-    pub(crate) store: &'a mut Store<D>,
+pub struct Register<'a, D> {
+    pub store: &'a mut Store<D>,
     /// `None` for files submitted by the user.
-    pub(crate) journal: Option<&'a mut Journal>,
+    pub journal: Option<&'a mut Journal>,
 }
 
 /// The input files of one model, split by bytes, requests and tokens.
-pub(crate) struct ModelInputFiles<D> {
+pub struct ModelInputFiles<D> {
     folder: PathBuf,
     stem: String,
     /// The lowest file number.
@@ -109,7 +109,7 @@ struct OpenFile<D> {
 
 impl<D: Detail> ModelInputFiles<D> {
     /// Files in `folder`, named `stem` with numbers from `first` on.
-    pub(crate) fn new(folder: &Path, stem: &str, first: u32, limits: FileLimits, destination: Destination) -> Self {
+    pub fn new(folder: &Path, stem: &str, first: u32, limits: FileLimits, destination: Destination) -> Self {
         Self {
             folder: folder.to_owned(),
             stem: stem.to_owned(),
@@ -125,7 +125,7 @@ impl<D: Detail> ModelInputFiles<D> {
     ///
     /// # Errors
     /// If the line exceeds the maximum size of a file, or cannot be written.
-    pub(crate) fn add(
+    pub fn add(
         &mut self,
         line: &[u8],
         blank: Record<D>,
@@ -167,7 +167,7 @@ impl<D: Detail> ModelInputFiles<D> {
     }
 
     /// Closes the last file; returns all files, each with its number of requests.
-    pub(crate) fn finish(mut self, register: &mut Register<'_, D>) -> Result<Vec<(PathBuf, usize)>> {
+    pub fn finish(mut self, register: &mut Register<'_, D>) -> Result<Vec<(PathBuf, usize)>> {
         self.close(register)?;
         Ok(self.done)
     }
@@ -252,7 +252,7 @@ const MAX_PART_TOKENS: f64 = 2e6;
 pub(super) type CostOf<'a, I> = &'a (dyn Fn(&Trial<I>, &Stimulus) -> RequestCost + Sync);
 
 /// The input files of all models, while they are written.
-pub(crate) struct Requests<'a, I: Item> {
+pub struct Requests<'a, I: Item> {
     models: &'a [ModelUnderTest],
     /// URL path of the requests, by model.
     urls: Vec<String>,
@@ -267,7 +267,7 @@ impl<'a, I: Item> Requests<'a, I> {
     ///
     /// # Errors
     /// If the folder cannot be created.
-    pub(crate) fn new(
+    pub fn new(
         models: &'a [ModelUnderTest],
         all: &[&ModelUnderTest],
         args: &'a BatchFileArgs,
@@ -307,7 +307,7 @@ impl<'a, I: Item> Requests<'a, I> {
     }
 
     /// Adds all requests of a group.
-    pub(crate) fn add(&mut self, group: &PreparedGroup<I>) -> Result<()> {
+    pub fn add(&mut self, group: &PreparedGroup<I>) -> Result<()> {
         let stimulus = &group.stimulus;
         group.notes.store(self.register.store)?;
         for trial in &group.trials {
@@ -331,7 +331,7 @@ impl<'a, I: Item> Requests<'a, I> {
     }
 
     /// Closes all files; returns each with its number of requests.
-    pub(crate) fn finish(mut self) -> Result<Vec<(PathBuf, usize)>> {
+    pub fn finish(mut self) -> Result<Vec<(PathBuf, usize)>> {
         let mut written = Vec::new();
         for files in self.files {
             written.extend(files.finish(&mut self.register)?);
@@ -359,7 +359,7 @@ fn destination(model: &ModelUnderTest, all: &[&ModelUnderTest], args: &BatchFile
 ///
 /// # Errors
 /// If a model is built in.
-pub(crate) fn require_remote(models: &[ModelUnderTest]) -> Result<()> {
+pub fn require_remote(models: &[ModelUnderTest]) -> Result<()> {
     match models.iter().find(|model| !model.model.is_remote()) {
         None => Ok(()),
         Some(local) => {
@@ -381,7 +381,7 @@ pub(super) fn require_files(models: &[ModelUnderTest]) -> Result<()> {
 }
 
 /// The text about the written files and the next step for the user.
-pub(crate) fn summary(written: &[(PathBuf, usize)], answered: usize, in_batch: usize, run: &Path) -> String {
+pub fn summary(written: &[(PathBuf, usize)], answered: usize, in_batch: usize, run: &Path) -> String {
     let requests: usize = written.iter().map(|(_, requests)| requests).sum();
     let mut text = format!(
         "{} in {}; {answered} already answered, {in_batch} waiting for an earlier batch\n",
@@ -412,7 +412,7 @@ pub(super) struct FileSettings<'a, I: Item> {
 
 /// Writes the input files of the first phase with remaining trials, and records in the run that these trials are in a
 /// batch.
-pub(crate) fn export<E: Experiment>(mut run: OpenRun<'_, E>, files: &BatchFileArgs) -> Result<Outcome> {
+pub fn export<E: Experiment>(mut run: OpenRun<'_, E>, files: &BatchFileArgs) -> Result<Outcome> {
     for phase in 0..E::PHASES.len() {
         let models = run.experiment.models(phase);
         let remaining = run.remaining(phase)?;

@@ -13,18 +13,18 @@ use super::file::StoppedModels;
 use super::journal::{BatchPart, Journal, Stage};
 use super::recover::recover;
 use super::servers::{BatchRunArgs, BatchServers, CollectArgs};
-use crate::ask::{AccessArgs, BaseUrl, Endpoint, Sending};
-use crate::engine::images::progress::Progress;
-use crate::engine::images::workers::thread_start_error;
-use crate::error::{Error, Result};
-use crate::store::Store;
-use crate::types::manifests::RunManifest;
-use crate::types::text::counted;
+use crate::images::progress::Progress;
+use crate::images::workers::thread_start_error;
+use darkqa_ask::{AccessArgs, BaseUrl, Endpoint, Sending};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_base::types::text::counted;
 use darkqa_score::answers::record::Detail;
+use darkqa_store::Store;
 
 /// The task for the batches of a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum FolderTask {
+pub enum FolderTask {
     /// Import the replies of ended batches.
     Fetch,
     /// Cancel all batches, wait until they have ended, and import the existing replies.
@@ -32,7 +32,7 @@ pub(crate) enum FolderTask {
 }
 
 /// The batches of a run folder, and their server.
-pub(crate) struct FolderBatches<'a> {
+pub struct FolderBatches<'a> {
     journal: Journal,
     manifest: &'a RunManifest,
     servers: BatchServers,
@@ -43,7 +43,7 @@ impl<'a> FolderBatches<'a> {
     ///
     /// # Errors
     /// If the program submitted no batch of this run, or its server is unknown.
-    pub(crate) fn open(folder: &Path, manifest: &'a RunManifest, access: &AccessArgs) -> Result<Self> {
+    pub fn open(folder: &Path, manifest: &'a RunManifest, access: &AccessArgs) -> Result<Self> {
         let journal = Journal::open(folder, manifest)?;
         if journal.parts.is_empty() {
             return Err(Error::Run {
@@ -62,7 +62,7 @@ impl<'a> FolderBatches<'a> {
     }
 
     /// One line per part, with the state of its batch at the server.
-    pub(crate) fn status(&self) -> Result<String> {
+    pub fn status(&self) -> Result<String> {
         let runtime = start_runtime()?;
         let mut counts = BTreeMap::new();
         let mut problems = String::new();
@@ -116,7 +116,7 @@ impl<'a> FolderBatches<'a> {
     ///
     /// # Errors
     /// If the server refuses all further calls.
-    pub(crate) fn carry_out<D: Detail>(
+    pub fn carry_out<D: Detail>(
         mut self,
         task: FolderTask,
         store: &mut Store<D>,

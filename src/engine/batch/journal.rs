@@ -17,11 +17,11 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, Result};
-use crate::files;
-use crate::store::{BATCH, BATCH_STATE, now};
-use crate::types::Digest;
-use crate::types::manifests::RunManifest;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::Digest;
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_store::{BATCH, BATCH_STATE, now};
 
 /// Number of hexadecimal digits of a run's hash.
 const HASH_DIGITS: usize = 16;
@@ -61,7 +61,7 @@ fn is_part_name(text: &str) -> bool {
 
 /// The parts of a run and their states.
 #[derive(Debug)]
-pub(crate) struct Journal {
+pub struct Journal {
     folder: PathBuf,
     /// Identifies the run in names of files and in marks of batches at the server.
     pub(super) run: String,
@@ -75,7 +75,7 @@ impl Journal {
     ///
     /// # Errors
     /// If the file cannot be read, or a line is broken.
-    pub(crate) fn open(run_folder: &Path, manifest: &RunManifest) -> Result<Self> {
+    pub fn open(run_folder: &Path, manifest: &RunManifest) -> Result<Self> {
         let facts = (&manifest.identity, &manifest.created);
         let hash = Digest::canonical("darkqa.batch/1", &facts)?.to_string();
         let mut journal = Self {
@@ -155,7 +155,7 @@ impl Journal {
     }
 
     /// Maximum cost of batches whose replies are not imported yet, in US dollars.
-    pub(crate) fn max_open_cost(&self) -> f64 {
+    pub fn max_open_cost(&self) -> f64 {
         self.parts.iter().filter(|part| part.may_cost()).map(|part| part.facts.max_cost()).sum()
     }
 
@@ -230,7 +230,7 @@ fn cut_incomplete_line(path: &Path) -> std::io::Result<()> {
 
 /// Facts about a part and its file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct PartFacts {
+pub struct PartFacts {
     /// SHA-256 of the file, as 64 hexadecimal digits.
     pub sha256: String,
     /// Size of the file in bytes.
@@ -290,7 +290,7 @@ impl PartFacts {
 /// An event that has happened to a part, or that is about to happen.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
-pub(crate) enum PartEvent {
+pub enum PartEvent {
     /// The file of the part is written.
     Written(PartFacts),
     /// The upload begins.
@@ -359,7 +359,7 @@ pub(crate) enum PartEvent {
 
 /// A new part that was split off a larger one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct SplitPart {
+pub struct SplitPart {
     /// File name.
     pub(super) file: String,
     pub(super) facts: PartFacts,
@@ -391,7 +391,7 @@ pub(super) enum Stage {
 
 /// An input file and its batch.
 #[derive(Debug, Clone)]
-pub(crate) struct BatchPart {
+pub struct BatchPart {
     /// Name of the file in the batch folder.
     pub(super) name: String,
     pub(super) facts: PartFacts,

@@ -7,12 +7,12 @@
 
 mod collect;
 mod driver;
-pub(crate) mod file;
+pub mod file;
 mod folder;
-pub(crate) mod journal;
+pub mod journal;
 mod recover;
-pub(crate) mod replies;
-pub(crate) mod run;
+pub mod replies;
+pub mod run;
 mod servers;
 mod submit;
 
@@ -20,15 +20,15 @@ use std::num::{NonZeroU64, NonZeroUsize};
 
 use clap::Args;
 
-use crate::types::Decides;
+use darkqa_base::types::Decides;
 
-pub(crate) use folder::{FolderBatches, FolderTask};
-pub(crate) use servers::{BatchRunArgs, CollectArgs};
+pub use folder::{FolderBatches, FolderTask};
+pub use servers::{BatchRunArgs, CollectArgs};
 
 /// Flags of the input files of a Batch API. The default limits are those of the vendor, else those of OpenAI and Azure.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Batch")]
-pub(crate) struct BatchFileArgs {
+pub struct BatchFileArgs {
     /// The largest size of a file, in MB; default: what is known of the endpoint, else 200
     #[arg(long, value_name = "MB", add = Decides::Nothing)]
     pub file_size: Option<NonZeroU64>,

@@ -13,11 +13,11 @@ use super::driver::{Driver, StepOutcome};
 use super::file::{PART, hexadecimal};
 use super::journal::{Journal, PartEvent, PartFacts, SplitPart, Stage};
 use super::replies::{for_each_line, key_of};
-use crate::error::{Error, Result};
-use crate::files::create_new;
-use crate::store::Store;
-use crate::types::TrialKey;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::create_new;
+use darkqa_base::types::TrialKey;
 use darkqa_score::answers::record::Detail;
+use darkqa_store::Store;
 
 /// Completes the files of parts with the requests that the run has recorded; gives up parts without such requests, and
 /// deletes other unfinished files.
@@ -245,7 +245,7 @@ impl PieceWriter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::batch::journal::tests::facts;
+    use crate::batch::journal::tests::facts;
 
     #[test]
     fn a_piece_has_its_share_of_the_whole() {

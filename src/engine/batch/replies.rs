@@ -11,16 +11,16 @@ use serde_json::Value;
 
 use super::driver::{Driver, StepOutcome};
 use super::journal::{PartEvent, Stage};
-use crate::ask::batch::{BatchLine, with_letter};
-use crate::ask::{Constrain, Model, TokenBound};
-use crate::error::{Error, Result};
-use crate::files;
-use crate::runs::renamed;
-use crate::store::{Store, StoredTrial};
-use crate::types::flags::read_word;
-use crate::types::manifests::RunManifest;
-use crate::types::{Failure, FailureKind, Finish, LostAttempts, Record, Reply, TrialKey, Unstated, Usage};
+use darkqa_ask::batch::{BatchLine, with_letter};
+use darkqa_ask::{Constrain, Model, TokenBound};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::flags::read_word;
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_base::types::{Failure, FailureKind, Finish, LostAttempts, Record, Reply, TrialKey, Unstated, Usage};
+use darkqa_runs::renamed;
 use darkqa_score::answers::record::{Detail, answered};
+use darkqa_store::{Store, StoredTrial};
 
 /// Numbers of lines by outcome.
 #[derive(Debug, Default)]
@@ -245,7 +245,7 @@ fn may_be_charged(kind: FailureKind) -> bool {
 ///
 /// # Errors
 /// If the run has written no batch, or a line is not in the format of a Batch API. Earlier replies stay imported.
-pub(crate) fn import<D: Detail>(store: &mut Store<D>, manifest: &RunManifest, files: &[PathBuf]) -> Result<String> {
+pub fn import<D: Detail>(store: &mut Store<D>, manifest: &RunManifest, files: &[PathBuf]) -> Result<String> {
     let folder = store.folder().to_owned();
     let mut replies = ReplyImport::new(store, manifest)?;
     if replies.blanks.is_empty() {
@@ -495,7 +495,7 @@ pub(super) fn for_each_line(path: &Path, mut take: impl FnMut(&str) -> Result<()
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::Digest;
+    use darkqa_base::types::Digest;
 
     #[test]
     fn the_key_of_a_line_is_its_first_field() {

@@ -9,21 +9,21 @@ use super::folder::{self, start_runtime};
 use super::journal::Journal;
 use super::recover::recover;
 use super::servers::{BatchRunArgs, BatchServers};
-use crate::engine::circuit_breaker::EndReason;
-use crate::engine::costs::{Budget, BudgetNotes, RunModels};
-use crate::engine::experiment::Experiment;
-use crate::engine::images::enhancement::enhancers::{self, EnhancerModels};
-use crate::engine::images::trials::{Item as _, Stimulus, Trial};
-use crate::engine::interrupt::Interrupt;
-use crate::engine::models::{self, ModelUnderTest};
-use crate::engine::open_run::{OpenRun, Remaining, every_model};
-use crate::engine::stored_keys::answered;
-use crate::error::{Error, Result};
-use crate::runs::outcome::Outcome;
-use crate::store::StoredTrial;
-use crate::types::TrialKey;
-use crate::types::manifests::Status;
-use crate::types::text::{money, plural};
+use crate::circuit_breaker::EndReason;
+use crate::costs::{Budget, BudgetNotes, RunModels};
+use crate::experiment::Experiment;
+use crate::images::enhancement::enhancers::{self, EnhancerModels};
+use crate::images::trials::{Item as _, Stimulus, Trial};
+use crate::interrupt::Interrupt;
+use crate::models::{self, ModelUnderTest};
+use crate::open_run::{OpenRun, Remaining, every_model};
+use crate::stored_keys::answered;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::TrialKey;
+use darkqa_base::types::manifests::Status;
+use darkqa_base::types::text::{money, plural};
+use darkqa_runs::outcome::Outcome;
+use darkqa_store::StoredTrial;
 
 /// Maximum number of further batches for requests without a reply; chosen.
 const MAX_REPEATS: usize = 3;
@@ -42,7 +42,7 @@ enum PhaseEnd {
 ///
 /// # Errors
 /// If a model is built in, or a server refuses all further calls. The batches stay, and the same command continues.
-pub(crate) fn run<E: Experiment>(run: OpenRun<'_, E>, files: &BatchFileArgs, args: &BatchRunArgs) -> Result<Outcome> {
+pub fn run<E: Experiment>(run: OpenRun<'_, E>, files: &BatchFileArgs, args: &BatchRunArgs) -> Result<Outcome> {
     let journal = Journal::open(run.store.folder(), &run.manifest)?;
     let mut batches = RunBatches {
         run,

@@ -9,15 +9,15 @@ use std::time::Duration;
 use clap::Args;
 
 use super::journal::PartFacts;
-use crate::ask::batch_api::BatchServer;
-use crate::engine::models::ModelUnderTest;
-use crate::error::{Error, Result};
-use crate::types::Decides;
-use crate::types::flags::{positive, seconds};
+use crate::models::ModelUnderTest;
+use darkqa_ask::batch_api::BatchServer;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Decides;
+use darkqa_base::types::flags::{positive, seconds};
 
 /// Batch servers, each with the key and headers of a model.
 #[derive(Debug, Default)]
-pub(crate) struct BatchServers(Vec<ModelServer>);
+pub(super) struct BatchServers(Vec<ModelServer>);
 
 /// The server of a model.
 #[derive(Debug)]
@@ -116,7 +116,7 @@ pub(super) fn account(model: &ModelUnderTest, models: &[&ModelUnderTest]) -> Res
 /// Flags for looking after batches.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Batch")]
-pub(crate) struct CollectArgs {
+pub struct CollectArgs {
     /// Seconds between two checks of the batches; up to 30 times as long while nothing changes
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "10", add = Decides::Nothing)]
     pub poll: Duration,
@@ -128,7 +128,7 @@ pub(crate) struct CollectArgs {
 /// Flags for submitting batches.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Batch")]
-pub(crate) struct BatchRunArgs {
+pub struct BatchRunArgs {
     /// Flags for looking after batches.
     #[command(flatten)]
     pub collect: CollectArgs,

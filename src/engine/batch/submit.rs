@@ -3,10 +3,10 @@
 
 use super::driver::{Driver, Goal, StepOutcome};
 use super::journal::PartEvent;
-use crate::ask::batch_api::{BatchState, NewBatch, Readiness, RemoteBatch};
-use crate::ask::{AskError, BatchInterface};
-use crate::error::{Error, Result};
-use crate::types::text::{counted, money};
+use darkqa_ask::batch_api::{BatchState, NewBatch, Readiness, RemoteBatch};
+use darkqa_ask::{AskError, BatchInterface};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::text::{counted, money};
 use darkqa_score::answers::record::Detail;
 
 /// Number of consecutive failed uploads or creations after which a model is stopped; chosen: 15 minutes by

@@ -11,19 +11,19 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-use crate::ask::{
+use crate::costs::money::MoneySettings;
+use crate::images::frames::Source;
+use crate::images::trials::{Item, Prompt, Trial};
+use crate::models::ModelUnderTest;
+use darkqa_ask::{
     ChargeRatios, Price, PricedRequest, ReplyExcess, Reservation, Spending, TokenBound, Unpriced, stated_charge,
 };
-use crate::engine::costs::money::MoneySettings;
-use crate::engine::images::frames::Source;
-use crate::engine::images::trials::{Item, Prompt, Trial};
-use crate::engine::models::ModelUnderTest;
-use crate::error::{Error, Result};
-use crate::pictures::Scaling;
-use crate::report::joined;
-use crate::store::StoredTrial;
-use crate::types::manifests::RunManifest;
-use crate::types::{ImageFacts, Unstated, Usage, Via};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_base::types::{ImageFacts, Unstated, Usage, Via};
+use darkqa_pictures::Scaling;
+use darkqa_report::joined;
+use darkqa_store::StoredTrial;
 
 /// Characters of English text per token, by the rule of thumb of every provider.
 const CHARACTERS_PER_TOKEN: f64 = 4.0;
@@ -36,10 +36,10 @@ const UNLIMITED_REPLY: u64 = 4096;
 
 /// The models that have replies in a run: those of all its phases, and those of earlier commands in its manifest.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct RunModels<'a> {
-    pub(crate) models: &'a [&'a ModelUnderTest],
+pub struct RunModels<'a> {
+    pub models: &'a [&'a ModelUnderTest],
     /// `None` if there are no other models.
-    pub(crate) manifest: Option<&'a RunManifest>,
+    pub manifest: Option<&'a RunManifest>,
 }
 
 impl RunModels<'_> {
@@ -56,7 +56,7 @@ impl RunModels<'_> {
 
 /// Cost of a run so far and the upper bounds of its requests, which `--max-cost` limits.
 #[derive(Debug)]
-pub(crate) struct Budget {
+pub struct Budget {
     models: Vec<ModelBudget>,
     spending: Arc<Spending>,
     /// Number of stored requests without stated tokens, and the upper bound of their cost in US dollars.
@@ -79,7 +79,7 @@ struct ModelBudget {
 
 /// Permission to ask a question now.
 #[derive(Debug)]
-pub(crate) enum Permit {
+pub enum Permit {
     /// Permitted: the model has no known price.
     Free,
     /// Permitted, with the cost reserved.
@@ -93,7 +93,7 @@ impl Budget {
     ///
     /// # Errors
     /// If `--max-cost` is set and a model has no price, because the limit could not be enforced.
-    pub(crate) fn new(money: &MoneySettings, models: &[ModelUnderTest], stored: &[StoredTrial]) -> Result<Self> {
+    pub fn new(money: &MoneySettings, models: &[ModelUnderTest], stored: &[StoredTrial]) -> Result<Self> {
         let all: Vec<&ModelUnderTest> = models.iter().collect();
         let run_models = RunModels { models: &all, manifest: None };
         Self::for_run(money, models, run_models, stored)
@@ -104,7 +104,7 @@ impl Budget {
     ///
     /// # Errors
     /// If `--max-cost` is set and a model has no price, because the limit could not be enforced.
-    pub(crate) fn for_run(
+    pub fn for_run(
         money: &MoneySettings,
         models: &[ModelUnderTest],
         run_models: RunModels<'_>,
@@ -140,14 +140,14 @@ impl Budget {
 
     /// Adds an upper bound in US dollars of the cost of requests without a record: those of batches that have not
     /// ended, and those of killed processes.
-    pub(crate) fn with_unrecorded(self, dollars: f64) -> Self {
+    pub fn with_unrecorded(self, dollars: f64) -> Self {
         let max_cost = self.spending.limit();
         let spending = Spending::new(max_cost, self.spending.spent()).with_pending_batches(dollars);
         Self { spending: Arc::new(spending), ..self }
     }
 
     /// Asks for permission to ask a question now, and reserves the upper bound of the cost of its first request.
-    pub(crate) fn permit<'a, I: Item>(
+    pub fn permit<'a, I: Item>(
         &self,
         model: &ModelUnderTest,
         trial: &Trial<I>,
@@ -161,7 +161,7 @@ impl Budget {
     }
 
     /// The request of a trial with the upper bound of its tokens; `None` if the model has no known price.
-    pub(crate) fn request<'a, I: Item>(
+    pub fn request<'a, I: Item>(
         &self,
         model: &ModelUnderTest,
         trial: &Trial<I>,
@@ -185,7 +185,7 @@ impl Budget {
 
     /// Corrects the bounds of later prompts by the charged tokens of a trial's prompt. Adds the stated charge of a
     /// model without a price, for which nothing is reserved.
-    pub(crate) fn observe<'a, I: Item>(
+    pub fn observe<'a, I: Item>(
         &mut self,
         model: &ModelUnderTest,
         trial: &Trial<I>,
@@ -206,7 +206,7 @@ impl Budget {
     }
 
     /// Expected tokens of a trial's prompt: of its text by length, of its images by the rule of the model's family.
-    pub(crate) fn expected_tokens<'a, I: Item>(
+    pub fn expected_tokens<'a, I: Item>(
         &self,
         model: &ModelUnderTest,
         trial: &Trial<I>,
@@ -218,7 +218,7 @@ impl Budget {
     }
 
     /// Expected tokens of images for a model and its index; `None` if the rule of its family is unknown.
-    pub(crate) fn expected_image_tokens<'a>(
+    pub fn expected_image_tokens<'a>(
         &self,
         index: usize,
         model: &ModelUnderTest,
@@ -229,52 +229,52 @@ impl Budget {
     }
 
     /// US dollars spent so far; `None` if no model has a price and no server states a charge.
-    pub(crate) fn spent(&self) -> Option<f64> {
+    pub fn spent(&self) -> Option<f64> {
         let spent = self.spending.spent();
         let is_known = spent > 0.0 || self.models.iter().any(|model| model.price.is_some());
         is_known.then_some(spent)
     }
 
     /// US dollars spent so far by all models with a price; zero if no model has one.
-    pub(crate) fn charged(&self) -> f64 {
+    pub fn charged(&self) -> f64 {
         self.spending.spent()
     }
 
     /// Number of stored requests without stated tokens, and the upper bound of their cost in US dollars.
-    pub(crate) fn unstated(&self) -> (u32, f64) {
+    pub fn unstated(&self) -> (u32, f64) {
         self.unstated
     }
 
     /// The spending that all requests share.
-    pub(crate) fn spending(&self) -> &Arc<Spending> {
+    pub fn spending(&self) -> &Arc<Spending> {
         &self.spending
     }
 
     /// Replies of a model beyond the token limit.
-    pub(crate) fn excess(&self, model: usize) -> &ReplyExcess {
+    pub fn excess(&self, model: usize) -> &ReplyExcess {
         &self.models[model].excess
     }
 
     /// Charges that the server of a model states.
-    pub(crate) fn charges(&self, model: usize) -> &ChargeRatios {
+    pub fn charges(&self, model: usize) -> &ChargeRatios {
         &self.models[model].charges
     }
 
     /// Number of stored replies by model that were charged more than the price table says.
-    pub(crate) fn dearer(&self) -> &BTreeMap<String, usize> {
+    pub fn dearer(&self) -> &BTreeMap<String, usize> {
         &self.dearer
     }
 
     /// Expected cost of a request to a model, in US dollars, by the price table and the charges so far; `None` if it
     /// has no known price.
-    pub(crate) fn expected_cost(&self, model: usize, prompt: f64, reply: f64) -> Option<f64> {
+    pub fn expected_cost(&self, model: usize, prompt: f64, reply: f64) -> Option<f64> {
         let ModelBudget { price, charges, .. } = &self.models[model];
         Some(charges.mean().unwrap_or(1.0) * (*price)?.cost(prompt, reply))
     }
 
     /// The reason why the price of a model is unknown, if it is another one than that the table does not have the
     /// model.
-    pub(crate) fn unpriced(money: &MoneySettings, model: &ModelUnderTest) -> Option<String> {
+    pub fn unpriced(money: &MoneySettings, model: &ModelUnderTest) -> Option<String> {
         let reason = model.priced(&money.prices).err()?;
         let is_told = reason != Unpriced::Model;
         is_told.then(|| reason.words(model.model.name(), &money.prices.as_of))
@@ -291,14 +291,14 @@ fn facts<'a, I: Item>(
 }
 
 /// Expected tokens of a prompt's text.
-pub(crate) fn text_tokens(prompt: &Prompt) -> f64 {
+pub fn text_tokens(prompt: &Prompt) -> f64 {
     let characters = prompt.parts().map(|part| part.chars().count());
     characters.iter().sum::<usize>() as f64 / CHARACTERS_PER_TOKEN + MESSAGE_TOKENS
 }
 
 /// Tokens of the images in a request about a source: `charged` tokens each if that is known, else by size. `None` if
 /// the tokens of an image are unknown.
-pub(crate) fn shown_tokens(
+pub(super) fn shown_tokens(
     model: &ModelUnderTest,
     price: Option<Price>,
     charged: Option<f64>,
@@ -345,18 +345,18 @@ const MAX_CLOSE_RATIO: f64 = 1.05;
 
 /// Facts that determine the tokens of a prompt.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct PromptFacts<'a> {
-    pub(crate) prompt: &'a Prompt,
+pub(super) struct PromptFacts<'a> {
+    pub prompt: &'a Prompt,
     /// Width and height of each image, in pixels.
-    pub(crate) sizes: &'a [(usize, usize)],
+    pub sizes: &'a [(usize, usize)],
     /// Bytes of the system message.
-    pub(crate) system_bytes: usize,
+    pub system_bytes: usize,
     /// Tokens of all images by the rule of the model's family; `None` if it is not known.
-    pub(crate) image_tokens: Option<f64>,
+    pub image_tokens: Option<f64>,
 }
 
 /// The width and the height of images.
-pub(crate) fn sizes<'a>(images: impl Iterator<Item = &'a ImageFacts>) -> Vec<(usize, usize)> {
+pub(super) fn sizes<'a>(images: impl Iterator<Item = &'a ImageFacts>) -> Vec<(usize, usize)> {
     images.map(|image| (image.width, image.height)).collect()
 }
 
@@ -379,7 +379,7 @@ impl Reference {
 
 /// Upper bounds of the tokens of a model's prompts.
 #[derive(Debug)]
-pub(crate) struct PromptBounds {
+pub(super) struct PromptBounds {
     references: VecDeque<Reference>,
     /// Largest ratio of charged tokens to the bound by length; at least 1.
     excess_by_length: f64,
@@ -388,12 +388,12 @@ pub(crate) struct PromptBounds {
 }
 
 impl PromptBounds {
-    pub(crate) fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self { references: VecDeque::new(), excess_by_length: 1.0, excess_by_comparison: 1.0 }
     }
 
     /// Upper bound of the tokens of a prompt.
-    pub(crate) fn bound(&self, facts: PromptFacts<'_>) -> u64 {
+    pub(super) fn bound(&self, facts: PromptFacts<'_>) -> u64 {
         let by_length = by_length(facts) * self.excess_by_length;
         let by_comparison = self.by_comparison(facts);
         let by_comparison = by_comparison.map(|tokens| tokens * self.excess_by_comparison);
@@ -401,7 +401,7 @@ impl PromptBounds {
     }
 
     /// Corrects the bounds of later prompts by the charged tokens of a prompt.
-    pub(crate) fn observe(&mut self, facts: PromptFacts<'_>, charged: u64) {
+    pub(super) fn observe(&mut self, facts: PromptFacts<'_>, charged: u64) {
         if charged == 0 {
             return;
         }
@@ -472,7 +472,7 @@ fn unshared(other: &[u8], text: &[u8]) -> usize {
 
 /// Cost of stored records in US dollars, and the charges that servers state in them.
 #[derive(Debug, Default)]
-pub(crate) struct StoredCosts {
+pub(super) struct StoredCosts {
     by_model: BTreeMap<String, ModelCosts>,
 }
 
@@ -489,7 +489,7 @@ struct ModelCosts {
 
 impl StoredCosts {
     /// Adds a record of a model with this price; without one, only stated charges count.
-    pub(crate) fn add(&mut self, price: Option<Price>, money: &MoneySettings, record: &StoredTrial) {
+    pub(super) fn add(&mut self, price: Option<Price>, money: &MoneySettings, record: &StoredTrial) {
         let lost = record.lost();
         let usages = [record.usage(), lost.map(|lost| lost.usage)];
         if price.is_none() && usages.iter().flatten().all(|usage| usage.cost.is_none()) {
@@ -512,14 +512,14 @@ impl StoredCosts {
     }
 
     /// Sum of all costs in US dollars.
-    pub(crate) fn sum(&self) -> f64 {
+    pub(super) fn sum(&self) -> f64 {
         let known: f64 = self.by_model.values().map(|model| model.known).sum();
         known + self.unstated().1
     }
 
     /// Number of requests without stated tokens, and the upper bound of their cost in US dollars: as dear as the other
     /// requests.
-    pub(crate) fn unstated(&self) -> (u32, f64) {
+    pub(super) fn unstated(&self) -> (u32, f64) {
         self.by_model.values().fold((0, 0.0), |(count, sum), model| {
             let (requests, dollars) = model.unstated;
             let dollars = model.charges.factor() * dollars;
@@ -528,14 +528,14 @@ impl StoredCosts {
     }
 
     /// Charges that the server of a model states.
-    pub(crate) fn charges(&self, model: &str) -> Arc<ChargeRatios> {
+    pub(super) fn charges(&self, model: &str) -> Arc<ChargeRatios> {
         let costs = self.by_model.get(model);
         costs.map_or_else(Arc::default, |costs| Arc::clone(&costs.charges))
     }
 
     /// Number of replies by model that were charged more than the price table says; models without such replies are
     /// left out.
-    pub(crate) fn dearer(&self) -> BTreeMap<String, usize> {
+    pub(super) fn dearer(&self) -> BTreeMap<String, usize> {
         let models = self.by_model.iter().filter(|(_, model)| model.dearer > 0);
         models.map(|(name, model)| (name.clone(), model.dearer)).collect()
     }

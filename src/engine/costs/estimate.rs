@@ -9,30 +9,30 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::token_check::MeasuredTokens;
-use crate::ask::{ImageLimit, Price, Server};
-use crate::engine::costs::budget::{Budget, shown_tokens, text_tokens};
-use crate::engine::experiment::{ExpectedRequest, Experiment};
-use crate::engine::image_cache::ImageSet;
-use crate::engine::images::frame_work::FrameWork;
-use crate::engine::images::frames::Source;
-use crate::engine::images::image_pipeline::ImagePipeline;
-use crate::engine::images::stored::Needed;
-use crate::engine::images::trials::{Item as _, Plan, SourcePlan, TrialGroup};
-use crate::engine::models::ModelUnderTest;
-use crate::engine::open_run::image_limit;
-use crate::error::Result;
-use crate::runs::forecast::{CostLine, FewSources, Forecast, ProfileCost, StoreForecast};
-use crate::runs::run_plan::FrameCost;
-use crate::store::StoredTrial;
-use crate::types::{Condition, Degradation, ImageFacts, ProfileName, View};
+use crate::costs::budget::{Budget, shown_tokens, text_tokens};
+use crate::experiment::{ExpectedRequest, Experiment};
+use crate::image_cache::ImageSet;
+use crate::images::frame_work::FrameWork;
+use crate::images::frames::Source;
+use crate::images::image_pipeline::ImagePipeline;
+use crate::images::stored::Needed;
+use crate::images::trials::{Item as _, Plan, SourcePlan, TrialGroup};
+use crate::models::ModelUnderTest;
+use crate::open_run::image_limit;
+use darkqa_ask::{ImageLimit, Price, Server};
+use darkqa_base::error::Result;
+use darkqa_base::types::{Condition, Degradation, ImageFacts, ProfileName, View};
+use darkqa_runs::forecast::{CostLine, FewSources, Forecast, ProfileCost, StoreForecast};
+use darkqa_runs::run_plan::FrameCost;
 use darkqa_score::cluster::MIN_CLUSTERS;
+use darkqa_store::StoredTrial;
 
 /// Assumed latency of a reply in seconds, if no reply is stored.
 const REPLY_SECONDS: f64 = 2.0;
 
 /// Estimates the remaining requests with their tokens, cost, bytes and time. A few images are made to measure their
 /// size.
-pub(crate) fn estimate<E: Experiment>(
+pub fn estimate<E: Experiment>(
     experiment: &E,
     plans: &[Plan<E::Item>],
     measured: &[MeasuredTokens],
@@ -327,24 +327,24 @@ const REQUEST_BYTES: f64 = 300.0;
 const BASE64: f64 = 4.0 / 3.0;
 
 /// Numbers, bytes and times of the remaining images and requests, estimated from a sample of images.
-pub(crate) struct PlannedImages {
+pub struct PlannedImages {
     /// Number of images to be made.
-    pub(crate) made: usize,
+    pub made: usize,
     /// Number of images in all requests.
-    pub(crate) sent: usize,
+    pub sent: usize,
     /// Bytes of all requests.
-    pub(crate) bytes: f64,
+    pub bytes: f64,
     /// Bytes of the largest request.
-    pub(crate) largest_request: f64,
+    pub largest_request: f64,
     /// Time to make all images on this machine, in seconds.
-    pub(crate) seconds: f64,
+    pub seconds: f64,
     /// The images that an image store would contain; `None` without a store.
-    pub(crate) set: Option<ImageSet>,
+    pub set: Option<ImageSet>,
 }
 
 impl PlannedImages {
     /// Estimates the images of the remaining trials in these plans, one plan for each phase.
-    pub(crate) fn new<E: Experiment>(experiment: &E, plans: &[Plan<E::Item>], sample: &SampledImages) -> Self {
+    pub fn new<E: Experiment>(experiment: &E, plans: &[Plan<E::Item>], sample: &SampledImages) -> Self {
         let mut all = Self {
             made: 0,
             sent: 0,
@@ -401,20 +401,16 @@ struct ImageMeans {
 
 /// Images that were made to measure their size and time.
 #[derive(Default)]
-pub(crate) struct SampledImages {
+pub struct SampledImages {
     /// Sizes of all sampled images.
-    pub(crate) images: Vec<ImageFacts>,
+    pub images: Vec<ImageFacts>,
     /// Sum of bytes, sum of seconds and number of images, by condition.
     sums: BTreeMap<Condition, (f64, f64, usize)>,
 }
 
 impl SampledImages {
     /// Makes the images of the middle frame of a few sources spread over the plan.
-    pub(crate) fn make<E: Experiment>(
-        experiment: &E,
-        plan: &Plan<E::Item>,
-        pipeline: &mut ImagePipeline<'_>,
-    ) -> Result<Self> {
+    pub fn make<E: Experiment>(experiment: &E, plan: &Plan<E::Item>, pipeline: &mut ImagePipeline<'_>) -> Result<Self> {
         let mut sample = Self::default();
         let sources = experiment.sources();
         let shown: Vec<_> = plan
@@ -460,7 +456,7 @@ const ENHANCED_SECONDS_PER_MEGAPIXEL: f64 = 1.0;
 const SECONDS_PER_REQUEST: f64 = 0.002;
 
 /// The cost of the trials of the first phase of an experiment, for each of its sources in their order.
-pub(crate) fn costs<E: Experiment>(experiment: &E, plan: &[SourcePlan<E::Item>]) -> Vec<FrameCost> {
+pub fn costs<E: Experiment>(experiment: &E, plan: &[SourcePlan<E::Item>]) -> Vec<FrameCost> {
     let sources = experiment.sources();
     let zero_cost = FrameCost { tokens: Some(0.0), dollars: Some(0.0), ..FrameCost::default() };
     let mut costs = vec![zero_cost; sources.len()];

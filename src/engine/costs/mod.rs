@@ -1,11 +1,11 @@
 //! Costs of a run: its limit, bounds, estimates and measured tokens.
 
 mod budget;
-pub(crate) mod estimate;
+pub mod estimate;
 mod money;
 mod token_check;
 
-pub(crate) use budget::text_tokens;
+pub use budget::text_tokens;
 
 pub(super) use budget::{Budget, Permit, RunModels};
 pub(super) use money::{MoneyArgs, MoneySettings};

@@ -7,16 +7,16 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::Value;
 
-use crate::ask::Prices;
-use crate::error::Result;
-use crate::runs::shard::Shard;
-use crate::types::Decides;
-use crate::types::flags::positive;
+use darkqa_ask::Prices;
+use darkqa_base::error::Result;
+use darkqa_base::types::Decides;
+use darkqa_base::types::flags::positive;
+use darkqa_runs::shard::Shard;
 
 /// Flags of cost and of the limits that end a run.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Sending")]
-pub(crate) struct MoneyArgs {
+pub struct MoneyArgs {
     /// Stop when this many trials have failed; default: never
     #[arg(long, value_name = "N", add = Decides::Nothing)]
     pub max_failures: Option<NonZeroUsize>,
@@ -36,7 +36,7 @@ pub(crate) struct MoneyArgs {
 
 /// Limits of cost and failures, validated.
 #[derive(Debug)]
-pub(crate) struct MoneySettings {
+pub struct MoneySettings {
     pub prices: Prices,
     /// Upper limit of the cost of this shard, in US dollars; `None` for no limit.
     pub max_cost: Option<f64>,
@@ -53,7 +53,7 @@ impl MoneySettings {
     ///
     /// # Errors
     /// If the file of prices, or the table in the settings, cannot be used.
-    pub(crate) fn resolve(args: &MoneyArgs, shard: Shard, stored: &BTreeMap<String, Value>) -> Result<Self> {
+    pub fn resolve(args: &MoneyArgs, shard: Shard, stored: &BTreeMap<String, Value>) -> Result<Self> {
         let prices = match &args.prices {
             Some(path) => Prices::load(path)?,
             None => Prices::from_settings(stored)?,

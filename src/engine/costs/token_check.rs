@@ -18,16 +18,16 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::money::MoneySettings;
-use crate::ask::{ImageTokenCheck, Spending};
-use crate::engine::costs::budget::{Budget, text_tokens};
-use crate::engine::images::frames::Source;
-use crate::engine::images::trials::{Item, Plan, Trial};
-use crate::engine::models::ModelUnderTest;
-use crate::error::{Error, Result};
-use crate::files;
-use crate::store::{StoredTrial, set_file_aside};
-use crate::types::text::money;
-use crate::types::{ImageFacts, TrialKey, Usage};
+use crate::costs::budget::{Budget, text_tokens};
+use crate::images::frames::Source;
+use crate::images::trials::{Item, Plan, Trial};
+use crate::models::ModelUnderTest;
+use darkqa_ask::{ImageTokenCheck, Spending};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::text::money;
+use darkqa_base::types::{ImageFacts, TrialKey, Usage};
+use darkqa_store::{StoredTrial, set_file_aside};
 
 /// Charged tokens of the prompts of a run, for each of its models. Warns once for each if they differ from the
 /// estimate, and if they show that the server shrinks the images.
@@ -141,7 +141,7 @@ const MARGIN: f64 = 1.25;
 
 /// Cost of requests without a record, in US dollars.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
-pub(crate) struct InFlightCost {
+pub struct InFlightCost {
     /// Upper bound of the requests in flight when earlier processes were killed.
     killed: f64,
     /// Upper bound of the requests in flight now.
@@ -153,7 +153,7 @@ impl InFlightCost {
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub(crate) fn open(folder: &Path) -> Result<Self> {
+    pub fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(NOTE);
         let text = match files::read(&path) {
             Ok(text) => text,
@@ -175,12 +175,12 @@ impl InFlightCost {
     }
 
     /// Upper bound of the cost of requests that killed processes left without a record, in US dollars.
-    pub(crate) fn killed(self) -> f64 {
+    pub fn killed(self) -> f64 {
         self.killed
     }
 
     /// Writes the cost in flight, if it is higher than the written one.
-    pub(crate) fn raise(&mut self, folder: &Path, dollars: f64) -> Result<()> {
+    pub fn raise(&mut self, folder: &Path, dollars: f64) -> Result<()> {
         if dollars <= self.in_flight {
             return Ok(());
         }
@@ -190,7 +190,7 @@ impl InFlightCost {
 
     /// Writes that nothing is in flight, once all requests have a record. Deletes the file if no process was killed
     /// either.
-    pub(crate) fn end(&mut self, folder: &Path) -> Result<()> {
+    pub fn end(&mut self, folder: &Path) -> Result<()> {
         if self.in_flight <= 0.0 {
             return Ok(());
         }
@@ -221,31 +221,26 @@ const TOLERANCE: f64 = 0.1;
 
 /// Tokens charged for images, by model of a phase.
 #[derive(Debug, Clone)]
-pub(crate) struct MeasuredTokens {
+pub struct MeasuredTokens {
     /// For each model, the charged tokens per image of each of the first replies, at most [`REPLIES`].
     images: Vec<Vec<f64>>,
 }
 
 /// The tokens of a prompt as estimated, and as charged.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Difference {
-    pub(crate) estimated: f64,
-    pub(crate) charged: f64,
+pub struct Difference {
+    pub estimated: f64,
+    pub charged: f64,
 }
 
 impl MeasuredTokens {
     /// No measurements yet, for a number of models.
-    pub(crate) fn new(models: usize) -> Self {
+    pub fn new(models: usize) -> Self {
         Self { images: vec![Vec::new(); models] }
     }
 
     /// Measures the stored replies to the trials of a plan about these sources.
-    pub(crate) fn from_stored<I: Item>(
-        models: usize,
-        plan: &Plan<I>,
-        sources: &[Source],
-        stored: &[StoredTrial],
-    ) -> Self {
+    pub fn from_stored<I: Item>(models: usize, plan: &Plan<I>, sources: &[Source], stored: &[StoredTrial]) -> Self {
         let charged: HashMap<TrialKey, u64> =
             stored.iter().filter_map(|record| Some((record.key, record.usage()?.prompt_tokens?))).collect();
         let mut measured = Self::new(models);
@@ -261,7 +256,7 @@ impl MeasuredTokens {
     }
 
     /// Adds a reply about a number of images: the charged tokens of its prompt, and the estimated tokens of the text.
-    pub(crate) fn add(&mut self, model: usize, charged: u64, text: f64, images: usize) {
+    pub fn add(&mut self, model: usize, charged: u64, text: f64, images: usize) {
         let measured = &mut self.images[model];
         if measured.len() < REPLIES && images > 0 {
             measured.push((charged as f64 - text).max(0.0) / images as f64);
@@ -269,7 +264,7 @@ impl MeasuredTokens {
     }
 
     /// Median of the tokens charged for one image; `None` before [`REPLIES`] replies.
-    pub(crate) fn image(&self, model: usize) -> Option<f64> {
+    pub fn image(&self, model: usize) -> Option<f64> {
         let mut images = self.images[model].clone();
         images.sort_by(f64::total_cmp);
         let middle = REPLIES / 2;
@@ -279,7 +274,7 @@ impl MeasuredTokens {
     /// Compares the estimated tokens of a prompt with the charged ones: `text` and `image_tokens` are the estimates for
     /// the text and for all `images` together. `None` if they differ by at most [`TOLERANCE`], or before [`REPLIES`]
     /// replies.
-    pub(crate) fn difference(&self, model: usize, text: f64, images: usize, image_tokens: f64) -> Option<Difference> {
+    pub fn difference(&self, model: usize, text: f64, images: usize, image_tokens: f64) -> Option<Difference> {
         let charged = text + self.image(model)? * images as f64;
         let estimated = text + image_tokens;
         let differs = (charged - estimated).abs() > TOLERANCE * estimated;

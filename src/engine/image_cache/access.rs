@@ -17,10 +17,10 @@ use clap::Args;
 
 use super::entry::{Damaged, Entry, EntryType, FOOTER, ImageSet, Key, StoredKinds, is_footer_valid};
 use super::folder::{StoreFolder, if_exists, sweep};
-use crate::error::{Error, Result};
-use crate::files::{self, FolderAccess};
-use crate::types::Decides;
-use crate::types::flags::positive;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{self, FolderAccess};
+use darkqa_base::types::Decides;
+use darkqa_base::types::flags::positive;
 
 /// Maximum number of written bytes between two sweeps; chosen.
 const SWEEP_AFTER: u64 = 1_000_000_000;
@@ -36,7 +36,7 @@ const TOUCH_AFTER: Duration = Duration::from_hours(24);
 
 /// A folder of images that is shared with other runs, processes and threads.
 #[derive(Debug)]
-pub(crate) struct ImageStore {
+pub struct ImageStore {
     /// The folder as the user wrote it.
     argument: PathBuf,
     folder: StoreFolder,
@@ -72,7 +72,7 @@ impl ImageStore {
     ///
     /// # Errors
     /// If the folder cannot be created or read.
-    pub(crate) fn open(folder: &Path, access: FolderAccess, kinds: StoredKinds, capacity: u64) -> Result<Self> {
+    pub fn open(folder: &Path, access: FolderAccess, kinds: StoredKinds, capacity: u64) -> Result<Self> {
         let store = Self {
             argument: folder.to_owned(),
             folder: StoreFolder::new(folder, access),
@@ -96,12 +96,12 @@ impl ImageStore {
     }
 
     /// Kinds of images that the store keeps.
-    pub(crate) fn kinds(&self) -> StoredKinds {
+    pub fn kinds(&self) -> StoredKinds {
         self.kinds
     }
 
     /// Images read and written so far, as a line for `--timings`.
-    pub(crate) fn summary(&self) -> String {
+    pub fn summary(&self) -> String {
         let (counts, bytes) = self.with_state(|state| (state.counts, state.bytes));
         let folder = self.argument.display();
         let [held, most] = [bytes, self.capacity].map(|bytes| bytes as f64 / 1e9);
@@ -114,18 +114,13 @@ impl ImageStore {
     }
 
     /// True if the store has a file for this key, which may be damaged.
-    pub(crate) fn contains(&self, key: &Key) -> bool {
+    pub fn contains(&self, key: &Key) -> bool {
         self.with_state(|state| state.health) != Health::Unusable && self.folder.path(key.digest()).is_file()
     }
 
     /// Reads the entry of a key; `None` if it is missing. A damaged entry is removed and counts as missing, like an
     /// entry for which `is_sufficient` is false. Hits and misses are counted for images only.
-    pub(crate) fn get(
-        &self,
-        key: &Key,
-        content: EntryType,
-        is_sufficient: impl FnOnce(&Entry) -> bool,
-    ) -> Option<Entry> {
+    pub fn get(&self, key: &Key, content: EntryType, is_sufficient: impl FnOnce(&Entry) -> bool) -> Option<Entry> {
         if self.with_state(|state| state.health) == Health::Unusable {
             return None;
         }
@@ -177,7 +172,7 @@ impl ImageStore {
     }
 
     /// Writes the entry of a key, if the store has room.
-    pub(crate) fn put(&self, key: &Key, entry: &Entry) {
+    pub fn put(&self, key: &Key, entry: &Entry) {
         if self.with_state(|state| state.health) != Health::Usable {
             return;
         }
@@ -281,27 +276,27 @@ fn read(path: &Path) -> io::Result<Result<Vec<u8>, Damaged>> {
 
 /// Numbers of images read, written and left out, with their bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct StoreCounts {
+pub(super) struct StoreCounts {
     /// Images that were read from the store.
-    pub(crate) hits: usize,
+    pub hits: usize,
     /// Bytes of these images.
-    pub(crate) hit_bytes: u64,
+    pub hit_bytes: u64,
     /// Measures, thumbnails and probe results that were read.
-    pub(crate) facts: usize,
+    pub facts: usize,
     /// Time saved by reading: the time that the entries took to compute, in milliseconds.
-    pub(crate) saved_ms: u64,
+    pub saved_ms: u64,
     /// Images that the store did not have.
-    pub(crate) misses: usize,
+    pub misses: usize,
     /// Images that were written to the store.
-    pub(crate) written: usize,
+    pub written: usize,
     /// Bytes of their files.
-    pub(crate) written_bytes: u64,
+    pub written_bytes: u64,
     /// Images that the store had no room for.
-    pub(crate) left_out: usize,
+    pub left_out: usize,
     /// Images whose files were damaged or exchanged, and therefore removed.
-    pub(crate) damaged: usize,
+    pub damaged: usize,
     /// Images that were removed because they had been unused for long.
-    pub(crate) evicted: usize,
+    pub evicted: usize,
 }
 
 impl fmt::Display for StoreCounts {
@@ -333,8 +328,7 @@ impl fmt::Display for StoreCounts {
 /// Flags of the folder in which images are kept for other runs.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Scale")]
-#[expect(clippy::struct_field_names, reason = "the names of the flags")]
-pub(crate) struct StoreArgs {
+pub struct StoreArgs {
     /// Folder of stored images, shared by runs, models, shards and processes; it may be deleted at any time;
     /// `darkqa-eval cache DIR` lists it; default: no image is stored
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
@@ -350,7 +344,7 @@ pub(crate) struct StoreArgs {
 
 impl StoreArgs {
     /// An empty estimate of the images that the store would keep; `None` without a store.
-    pub(crate) fn image_set(&self) -> Option<ImageSet> {
+    pub fn image_set(&self) -> Option<ImageSet> {
         let set = ImageSet::new(self.images_cache_what, self.images_cache_size * 1e9);
         self.images_cache.is_some().then_some(set)
     }
@@ -359,7 +353,7 @@ impl StoreArgs {
     ///
     /// # Errors
     /// If the folder cannot be created or read.
-    pub(crate) fn open(&self, access: FolderAccess) -> Result<Option<ImageStore>> {
+    pub fn open(&self, access: FolderAccess) -> Result<Option<ImageStore>> {
         let bytes = (self.images_cache_size * 1e9) as u64;
         self.images_cache
             .as_deref()

@@ -24,9 +24,9 @@ use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::error::Result;
-use crate::types::Digest;
-use crate::types::flags::flag_words;
+use darkqa_base::error::Result;
+use darkqa_base::types::Digest;
+use darkqa_base::types::flags::flag_words;
 
 /// Last bytes of each file: type and version of the format.
 const MAGIC: &[u8; 8] = b"DQIMAGE1";
@@ -36,24 +36,24 @@ pub(super) const FOOTER: usize = 32 + 8 + 3 * 4 + 8;
 
 /// An entry of the store: an image with facts, or only facts.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Entry {
+pub struct Entry {
     /// Encoded image or thumbnail; empty for an entry with facts only.
-    pub(crate) image: Vec<u8>,
+    pub image: Vec<u8>,
     /// Width and height in pixels; 0 without an image.
-    pub(crate) size: [u32; 2],
-    pub(crate) facts: EntryFacts,
+    pub size: [u32; 2],
+    pub facts: EntryFacts,
 }
 
 /// Facts stored with an image, or without one.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub(crate) struct EntryFacts {
+pub struct EntryFacts {
     /// Description of the entry, for listings of the store.
-    pub(crate) shown: Shown,
+    pub shown: Shown,
     /// Time that the entry took to compute, in milliseconds.
-    pub(crate) milliseconds: u64,
+    pub milliseconds: u64,
     /// Results recorded when the image was computed, in a format of the caller.
     #[serde(default)]
-    pub(crate) notes: Value,
+    pub notes: Value,
     /// Input of the key's digest.
     #[serde(default)]
     recipe: Value,
@@ -62,7 +62,7 @@ pub(crate) struct EntryFacts {
 /// Type of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum EntryType {
+pub enum EntryType {
     /// An image, with its measures.
     #[default]
     Image,
@@ -76,16 +76,16 @@ pub(crate) enum EntryType {
 
 /// Description of an entry in listings.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
-pub(crate) struct Shown {
+pub struct Shown {
     #[serde(default)]
-    pub(crate) content: EntryType,
+    pub content: EntryType,
     /// Name of the enhancer; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) enhancer: Option<String>,
+    pub enhancer: Option<String>,
     /// Degradation of the frame, such as `L3-noise`; empty for a probe.
-    pub(crate) light: String,
+    pub light: String,
     /// Image format, such as `png`; empty for a probe.
-    pub(crate) format: String,
+    pub format: String,
 }
 
 impl fmt::Display for Shown {
@@ -109,7 +109,7 @@ impl fmt::Display for Shown {
 
 impl EntryFacts {
     /// Facts about an entry that took this time to compute.
-    pub(crate) fn new(shown: Shown, milliseconds: u64, notes: Value) -> Self {
+    pub fn new(shown: Shown, milliseconds: u64, notes: Value) -> Self {
         Self { shown, milliseconds, notes, recipe: Value::Null }
     }
 }
@@ -120,7 +120,7 @@ pub(super) struct Damaged;
 
 impl Entry {
     /// An entry without an image.
-    pub(crate) fn from_facts(facts: EntryFacts) -> Self {
+    pub fn from_facts(facts: EntryFacts) -> Self {
         Self { image: Vec::new(), size: [0, 0], facts }
     }
 
@@ -233,7 +233,7 @@ const DOMAIN: &str = "darkqa.image-store/1";
 
 /// Digest of a recipe (everything that determines the file of an image), with the recipe as canonical JSON.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Key {
+pub struct Key {
     digest: Digest,
     recipe: Value,
 }
@@ -243,12 +243,12 @@ impl Key {
     ///
     /// # Errors
     /// If a number of the recipe is infinite or NaN.
-    pub(crate) fn from_recipe(recipe: &impl Serialize) -> Result<Self> {
+    pub fn from_recipe(recipe: &impl Serialize) -> Result<Self> {
         let (digest, recipe) = Digest::canonical_value(DOMAIN, recipe)?;
         Ok(Self { digest, recipe })
     }
 
-    pub(crate) fn digest(&self) -> &Digest {
+    pub fn digest(&self) -> &Digest {
         &self.digest
     }
 
@@ -260,7 +260,7 @@ impl Key {
 
 /// Which images are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum StoredKinds {
+pub enum StoredKinds {
     /// Enhanced images; of the others PSNR and SSIM alone
     Enhanced,
     /// Degraded ones too, which are made faster than a network share is read: for slow processors and fast disks
@@ -271,7 +271,7 @@ flag_words!(StoredKinds);
 
 /// Estimated size of a run's images that a store would keep, and the store's capacity, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ImageSet {
+pub struct ImageSet {
     kinds: StoredKinds,
     bytes: f64,
     room: f64,
@@ -284,25 +284,25 @@ impl ImageSet {
     }
 
     /// Adds images of this total size in bytes, if the store keeps images of this kind.
-    pub(crate) fn add(&mut self, is_enhanced: bool, bytes: f64) {
+    pub fn add(&mut self, is_enhanced: bool, bytes: f64) {
         if is_enhanced || self.kinds == StoredKinds::All {
             self.bytes += bytes;
         }
     }
 
     /// Description of the images that the store keeps.
-    pub(crate) fn description(&self) -> &'static str {
+    pub fn description(&self) -> &'static str {
         match self.kinds {
             StoredKinds::Enhanced => "enhanced images",
             StoredKinds::All => "images",
         }
     }
 
-    pub(crate) fn bytes(&self) -> f64 {
+    pub fn bytes(&self) -> f64 {
         self.bytes
     }
 
-    pub(crate) fn room(&self) -> f64 {
+    pub fn room(&self) -> f64 {
         self.room
     }
 }

@@ -13,10 +13,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, SystemTime};
 
 use super::entry::{Shown, facts_at_end};
-use crate::error::{Error, Result};
-use crate::files::{self, FolderAccess};
-use crate::types::Digest;
-use crate::types::text::counted;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{self, FolderAccess};
+use darkqa_base::types::Digest;
+use darkqa_base::types::text::counted;
 
 /// Version of the layout, as the name of its folder.
 const VERSION: &str = "v1";
@@ -273,7 +273,7 @@ impl Sum {
 ///
 /// # Errors
 /// If the folder is not a store, or cannot be read.
-pub(crate) fn listing(folder: &Path) -> Result<String> {
+pub fn listing(folder: &Path) -> Result<String> {
     let (files, now) = (files(folder)?, SystemTime::now());
     let (mut all, mut by_shown) = (Sum::default(), BTreeMap::<Option<Shown>, Sum>::new());
     let mut by_age = [Sum::default(); AGES.len() + 1];
@@ -323,7 +323,7 @@ pub(crate) fn listing(folder: &Path) -> Result<String> {
 ///
 /// # Errors
 /// If the folder is not a store, or a file cannot be removed.
-pub(crate) fn clear(folder: &Path) -> Result<String> {
+pub fn clear(folder: &Path) -> Result<String> {
     let mut sum = Sum::default();
     for file in files(folder)? {
         match fs::remove_file(&file.path) {
@@ -358,8 +358,8 @@ fn facts(file: &StoredFile) -> Option<super::EntryFacts> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::FolderAccess;
-    use crate::types::Digest;
+    use darkqa_base::files::FolderAccess;
+    use darkqa_base::types::Digest;
 
     fn key(day: u64) -> Digest {
         Digest::from_bytes(&day.to_le_bytes())

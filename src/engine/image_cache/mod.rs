@@ -13,6 +13,6 @@ mod access;
 mod entry;
 mod folder;
 
-pub(crate) use access::{ImageStore, StoreArgs};
-pub(crate) use entry::{Entry, EntryFacts, EntryType, ImageSet, Key, Shown, StoredKinds};
-pub(crate) use folder::{clear, listing};
+pub use access::{ImageStore, StoreArgs};
+pub use entry::{Entry, EntryFacts, EntryType, ImageSet, Key, Shown, StoredKinds};
+pub use folder::{clear, listing};

@@ -13,23 +13,23 @@ use super::frames::matching_degradation;
 use super::notes::similarity;
 use super::stored::{Needed, Similarity, StoredNotes};
 use super::timings::ImageSteps;
-use crate::data::Picture;
-use crate::engine::images::frames::{DegradeStage, Source, SourceFrame, SourcePhotograph};
-use crate::engine::images::recipes::Recipe;
-use crate::engine::images::stored::StoredPlace;
-use crate::engine::images::timings::TimedStep;
-use crate::error::{Error, Result};
-use crate::pictures::{Payload, PayloadFormat, Scaling, bilinear};
-use crate::types::{
+use crate::images::frames::{DegradeStage, Source, SourceFrame, SourcePhotograph};
+use crate::images::recipes::Recipe;
+use crate::images::stored::StoredPlace;
+use crate::images::timings::TimedStep;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::{
     Condition, Degradation, Digest, EnhancerName, ExposureFacts, FrameId, InputNote, PairDark, PairFacts, PhotoName,
     Pixels, Rgb, Treatment,
 };
+use darkqa_data::Picture;
 use darkqa_enhance::ImageUse;
 use darkqa_light::{AppliedDegradation, Exposures, FrameView, NoiseKey};
+use darkqa_pictures::{Payload, PayloadFormat, Scaling, bilinear};
 
 /// Cached steps of one frame (file, clean pixels, degraded image). Each is computed on first use.
-pub(crate) struct FrameWork<'a> {
-    pub(crate) steps: ImageSteps<'a>,
+pub struct FrameWork<'a> {
+    pub steps: ImageSteps<'a>,
     frame: FrameId,
     /// Source of the frame, which may share its camera state.
     source: FrameId,
@@ -57,7 +57,7 @@ pub(crate) struct FrameWork<'a> {
 
 impl<'a> FrameWork<'a> {
     /// The steps of a frame of a planned source. The file is read on first use, and must still have the same digest.
-    pub(crate) fn for_source(steps: ImageSteps<'a>, source: &Source, frame: &SourceFrame) -> Self {
+    pub fn for_source(steps: ImageSteps<'a>, source: &Source, frame: &SourceFrame) -> Self {
         Self {
             origin: steps.stored.map(|_| Box::new((source.name.clone(), frame.clone()))),
             size: Some(frame.size),
@@ -67,7 +67,7 @@ impl<'a> FrameWork<'a> {
     }
 
     /// The steps of a frame without a plan; the digest of its file is not checked.
-    pub(crate) fn for_frame(steps: ImageSteps<'a>, frame: FrameId) -> Self {
+    pub fn for_frame(steps: ImageSteps<'a>, frame: FrameId) -> Self {
         Self::new(steps, frame.clone(), frame, None)
     }
 
@@ -92,12 +92,12 @@ impl<'a> FrameWork<'a> {
     }
 
     /// Width and height of the file, in pixels; `None` for an unplanned frame that was not read yet.
-    pub(crate) fn size(&self) -> Option<[u32; 2]> {
+    pub fn size(&self) -> Option<[u32; 2]> {
         self.size.map(|(width, height)| [width, height])
     }
 
     /// The name of the frame.
-    pub(crate) fn frame(&self) -> &FrameId {
+    pub fn frame(&self) -> &FrameId {
         &self.frame
     }
 
@@ -105,7 +105,7 @@ impl<'a> FrameWork<'a> {
     ///
     /// # Errors
     /// If the frame cannot be shown in the condition.
-    pub(crate) fn stored_place(&self, condition: &Condition) -> Result<Option<StoredPlace<'a>>> {
+    pub fn stored_place(&self, condition: &Condition) -> Result<Option<StoredPlace<'a>>> {
         let (Some(stored), Some(origin)) = (self.steps.stored, &self.origin) else {
             return Ok(None);
         };
@@ -115,12 +115,12 @@ impl<'a> FrameWork<'a> {
     }
 
     /// Changes that reading the file makes besides decoding it.
-    pub(crate) fn note(&mut self) -> Result<InputNote> {
+    pub fn note(&mut self) -> Result<InputNote> {
         self.picture().map(Picture::note)
     }
 
     /// The file of the frame, if it is a plain PNG that can be sent unchanged; else `None`.
-    pub(crate) fn unchanged_file(&mut self, condition: &Condition) -> Result<Option<Arc<Payload>>> {
+    pub fn unchanged_file(&mut self, condition: &Condition) -> Result<Option<Arc<Payload>>> {
         let Recipe { format, scaling, .. } = *self.steps.recipe;
         if *condition != Condition::L0 || format != PayloadFormat::Png || matches!(scaling, Scaling::LongerSide(_)) {
             return Ok(None);
@@ -141,7 +141,7 @@ impl<'a> FrameWork<'a> {
     ///
     /// # Errors
     /// If it cannot be read, or its digest is not that of the plan.
-    pub(crate) fn picture(&mut self) -> Result<&Picture> {
+    pub fn picture(&mut self) -> Result<&Picture> {
         let (steps, frame, planned_digest) = (self.steps, &self.frame, self.planned_digest);
         let photograph = self.photograph.as_ref();
         get_or_try_insert(&mut self.picture, || {
@@ -162,7 +162,7 @@ impl<'a> FrameWork<'a> {
     ///
     /// # Errors
     /// If the file is broken, or a frame of more than 8 bits would be degraded after scaling.
-    pub(crate) fn pixels(&mut self) -> Result<&Pixels> {
+    pub fn pixels(&mut self) -> Result<&Pixels> {
         if self.pixels.is_none() {
             let ImageSteps { recipe, timings, .. } = self.steps;
             let picture = self.picture()?;
@@ -179,7 +179,7 @@ impl<'a> FrameWork<'a> {
     }
 
     /// The clean frame as 8-bit codes, in the size of [`Self::pixels`].
-    pub(crate) fn clean(&mut self) -> Result<&Arc<Rgb>> {
+    pub fn clean(&mut self) -> Result<&Arc<Rgb>> {
         if self.clean.is_none() {
             self.clean = Some(self.pixels()?.codes());
         }
@@ -187,7 +187,7 @@ impl<'a> FrameWork<'a> {
     }
 
     /// The clean frame in the size sent.
-    pub(crate) fn clean_as_sent(&mut self) -> Result<Arc<Rgb>> {
+    pub fn clean_as_sent(&mut self) -> Result<Arc<Rgb>> {
         if let Some(clean) = &self.clean_as_sent {
             return Ok(Arc::clone(clean));
         }
@@ -202,7 +202,7 @@ impl<'a> FrameWork<'a> {
     }
 
     /// The parameters of a degradation for this frame.
-    pub(crate) fn apply(&mut self, how: &Degradation) -> Result<AppliedDegradation> {
+    pub fn apply(&mut self, how: &Degradation) -> Result<AppliedDegradation> {
         let recipe = self.steps.recipe;
         let key = self.noise_key(how);
         let view = if how.kind().has_motion() { self.view()? } else { FrameView::default() };
@@ -210,7 +210,7 @@ impl<'a> FrameWork<'a> {
     }
 
     /// The camera's exposure in a condition; `None` for a kind that leaves it open.
-    pub(crate) fn exposure(&mut self, condition: &Condition) -> Result<Option<ExposureFacts>> {
+    pub fn exposure(&mut self, condition: &Condition) -> Result<Option<ExposureFacts>> {
         let how = condition.degradation().filter(|how| how.kind().has_motion());
         let applied = how.map(|how| self.apply(how)).transpose()?;
         Ok(applied.and_then(|applied| applied.exposure()))
@@ -235,7 +235,7 @@ impl<'a> FrameWork<'a> {
 
     /// The degraded frame, or the clean one without a degradation. The last degraded frame is cached, because several
     /// enhancers use it.
-    pub(crate) fn degraded(&mut self, how: Option<&Degradation>) -> Result<&Arc<Rgb>> {
+    pub fn degraded(&mut self, how: Option<&Degradation>) -> Result<&Arc<Rgb>> {
         let Some(how) = how else {
             return self.clean();
         };
@@ -281,13 +281,13 @@ fn get_or_try_insert<T>(slot: &mut Option<T>, compute: impl FnOnce() -> Result<T
 /// A condition of one frame after pairs are replaced: a photograph becomes an untouched frame, and a synthetic image as
 /// dark as the photograph becomes a degradation with the exposure drop of that photograph. So all rules for untouched
 /// and degraded frames apply.
-pub(crate) struct Resolved<'w, 'a> {
+pub struct Resolved<'w, 'a> {
     /// The steps of the frame, or of its photograph.
-    pub(crate) work: &'w mut FrameWork<'a>,
+    pub work: &'w mut FrameWork<'a>,
     /// The condition of `work`: untouched or degraded.
-    pub(crate) condition: Condition,
+    pub condition: Condition,
     /// How dark the photograph is; `None` if the condition has no pair.
-    pub(crate) pair: Option<PairFacts>,
+    pub pair: Option<PairFacts>,
 }
 
 impl<'a> FrameWork<'a> {
@@ -295,7 +295,7 @@ impl<'a> FrameWork<'a> {
     ///
     /// # Errors
     /// If the frame has no such photograph, or its exposure drop is unknown or cannot be synthesised.
-    pub(crate) fn resolve(&mut self, condition: &Condition) -> Result<Resolved<'_, 'a>> {
+    pub fn resolve(&mut self, condition: &Condition) -> Result<Resolved<'_, 'a>> {
         match &condition.treatment {
             Treatment::Untouched | Treatment::Degraded(_) => {
                 Ok(Resolved { work: self, condition: condition.clone(), pair: None })
@@ -372,17 +372,17 @@ fn with_pair_facts(payload: Arc<Payload>, pair: Option<PairFacts>) -> Arc<Payloa
 }
 
 /// An image as it is sent, with facts about it.
-pub(crate) struct PreparedImage<'a> {
-    pub(crate) payload: Arc<Payload>,
-    pub(crate) pixels: PixelsSent,
+pub struct PreparedImage<'a> {
+    pub payload: Arc<Payload>,
+    pub pixels: PixelsSent,
     /// Similarity to the clean frame; `None` if it was not wanted.
-    pub(crate) similarity: Option<Similarity>,
+    pub similarity: Option<Similarity>,
     /// Place in the store; `None` if the image is not stored.
-    pub(crate) place: Option<StoredPlace<'a>>,
+    pub place: Option<StoredPlace<'a>>,
 }
 
 /// Where the pixels of a sent image are.
-pub(crate) enum PixelsSent {
+pub enum PixelsSent {
     /// In memory, because they were just encoded.
     Encoded(Arc<Rgb>),
     /// In the file of the frame, which is sent unchanged.
@@ -392,7 +392,7 @@ pub(crate) enum PixelsSent {
 }
 
 /// An image that is ready, or that its enhancer must still process.
-pub(crate) enum StagedImage<'a> {
+pub enum StagedImage<'a> {
     Ready(PreparedImage<'a>),
     /// An enhanced image from the store. Its notes must still be added to the usage of its enhancer.
     Stored {
@@ -408,7 +408,7 @@ pub(crate) enum StagedImage<'a> {
 }
 
 /// The steps that turn the pixels of an image into a [`PreparedImage`]: encode, compare with the clean frame, store.
-pub(crate) struct ImageFinisher<'a> {
+pub struct ImageFinisher<'a> {
     steps: ImageSteps<'a>,
     /// Changes that reading the frame made besides decoding it.
     note: InputNote,
@@ -422,7 +422,7 @@ pub(crate) struct ImageFinisher<'a> {
     /// Similarity from the store.
     known: Option<Similarity>,
     /// Time spent on the pixels so far.
-    pub(crate) took: Duration,
+    pub took: Duration,
 }
 
 impl<'a> FrameWork<'a> {
@@ -431,7 +431,7 @@ impl<'a> FrameWork<'a> {
     ///
     /// # Errors
     /// If the frame cannot be read, or cannot be shown in the condition.
-    pub(crate) fn stage(&mut self, condition: &Condition, needed: Needed) -> Result<StagedImage<'a>> {
+    pub fn stage(&mut self, condition: &Condition, needed: Needed) -> Result<StagedImage<'a>> {
         let Resolved { work, condition, pair } = self.resolve(condition)?;
         let steps = work.steps;
         let place = work.stored_place(&condition)?;
@@ -485,7 +485,7 @@ impl<'a> ImageFinisher<'a> {
     ///
     /// # Errors
     /// If it cannot be encoded, or is larger than the endpoint accepts.
-    pub(crate) fn image(self, pixels: &Arc<Rgb>, enhanced: Option<ImageUse>) -> Result<PreparedImage<'a>> {
+    pub fn image(self, pixels: &Arc<Rgb>, enhanced: Option<ImageUse>) -> Result<PreparedImage<'a>> {
         let started = Instant::now();
         let (payload, encoded) = self.steps.payload(pixels, &self.note, self.exposure)?;
         let measuring = Instant::now();

@@ -19,26 +19,26 @@ use tokio::sync::mpsc::Sender;
 use super::frame_work::{PixelsSent, PreparedImage, Resolved, StagedImage};
 use super::notes::{ShownObjects, WantedNotes, fidelity, thumbnail, thumbnail_of_all};
 use super::timings::ImageSteps;
-use crate::engine::images::enhancement::LazyEnhancer;
-use crate::engine::images::frame_work::FrameWork;
-use crate::engine::images::frames::Source;
-use crate::engine::images::notes::{ImageNotes, MissingNotes};
-use crate::engine::images::stored::{Needed, StoredNotes};
-use crate::engine::images::timings::TimedStep;
-use crate::engine::images::trials::{Item, PreparedGroup, SourcePlan, Stimulus, TrialGroup};
-use crate::engine::images::workers::Workers;
-use crate::error::{Error, Result};
-use crate::pictures::Payload;
-use crate::types::{Condition, EnhancerName, FrameId, Rgb, Thumbnail};
+use crate::images::enhancement::LazyEnhancer;
+use crate::images::frame_work::FrameWork;
+use crate::images::frames::Source;
+use crate::images::notes::{ImageNotes, MissingNotes};
+use crate::images::stored::{Needed, StoredNotes};
+use crate::images::timings::TimedStep;
+use crate::images::trials::{Item, PreparedGroup, SourcePlan, Stimulus, TrialGroup};
+use crate::images::workers::Workers;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::{Condition, EnhancerName, FrameId, Rgb, Thumbnail};
 use darkqa_enhance::{Enhancer, ImageUse, Implausible};
+use darkqa_pictures::Payload;
 
-pub(crate) use preparation::EnhancerStopper;
+pub use preparation::EnhancerStopper;
 
 /// The steps from a frame to an image, with the enhancement models that they need.
-pub(crate) struct ImagePipeline<'a> {
-    pub(crate) steps: ImageSteps<'a>,
+pub struct ImagePipeline<'a> {
+    pub steps: ImageSteps<'a>,
     /// Open enhancers.
-    pub(crate) enhancers: Vec<Enhancer>,
+    pub enhancers: Vec<Enhancer>,
     /// Enhancers that are opened only if an image is missing in the store.
     lazy: Vec<Arc<LazyEnhancer>>,
     /// One set of enhancers per worker; empty if one image is enhanced at a time.
@@ -46,7 +46,7 @@ pub(crate) struct ImagePipeline<'a> {
     /// Reaction to implausible output of an enhancer: stop or continue.
     implausible: Implausible,
     /// In a shard: the frames of the whole run on which enhancers are probed. Empty: the frames of the plan are used.
-    pub(crate) whole_run: &'a [Source],
+    pub whole_run: &'a [Source],
 }
 
 /// A source in progress.
@@ -61,7 +61,7 @@ enum SourceWork<'a> {
 
 impl<'a> ImagePipeline<'a> {
     /// A pipeline with open enhancers.
-    pub(crate) fn new(steps: ImageSteps<'a>, enhancers: Vec<Enhancer>, implausible: Implausible) -> Self {
+    pub fn new(steps: ImageSteps<'a>, enhancers: Vec<Enhancer>, implausible: Implausible) -> Self {
         Self { steps, enhancers, lazy: Vec::new(), enhancer_sets: Vec::new(), implausible, whole_run: &[] }
     }
 
@@ -70,7 +70,7 @@ impl<'a> ImagePipeline<'a> {
     /// Normally each worker has one thread, its own frame and its own set of enhancers. All workers share one source in
     /// three cases: if the enhancers are open only once (they have their own threads), for walks, and if there are few
     /// frames.
-    pub(crate) fn develop<I: Item>(
+    pub fn develop<I: Item>(
         mut self,
         sources: &[Source],
         plan: Vec<SourcePlan<I>>,
@@ -127,7 +127,7 @@ impl<'a> ImagePipeline<'a> {
     ///
     /// # Errors
     /// The first error of `take`. If an image cannot be made, its group contains the problem.
-    pub(crate) fn for_each_group<I: Item, X>(
+    pub fn for_each_group<I: Item, X>(
         &mut self,
         sources: &[Source],
         plan: impl Iterator<Item = SourcePlan<I>>,
@@ -208,7 +208,7 @@ impl<'a> ImagePipeline<'a> {
     ///
     /// # Errors
     /// If the source cannot be shown, or one of its images cannot be made.
-    pub(crate) fn images(&mut self, source: &Source, conditions: &[&Condition]) -> Result<Vec<Vec<Arc<Payload>>>> {
+    pub fn images(&mut self, source: &Source, conditions: &[&Condition]) -> Result<Vec<Vec<Arc<Payload>>>> {
         if let Some(problem) = &source.problem {
             return Err(Error::data(&source.name, problem));
         }
@@ -241,7 +241,7 @@ impl<'a> ImagePipeline<'a> {
     }
 
     /// Makes the image of a frame in a condition as it is sent, with the facts that are needed.
-    pub(crate) fn image<'w>(
+    pub fn image<'w>(
         &mut self,
         work: &mut FrameWork<'w>,
         condition: &Condition,
@@ -252,7 +252,7 @@ impl<'a> ImagePipeline<'a> {
     }
 
     /// Makes the pixels of a frame in a condition, in the size of the frame.
-    pub(crate) fn pixels(&mut self, work: &mut FrameWork<'_>, condition: &Condition) -> Result<Arc<Rgb>> {
+    pub fn pixels(&mut self, work: &mut FrameWork<'_>, condition: &Condition) -> Result<Arc<Rgb>> {
         let Resolved { work, condition, .. } = work.resolve(condition)?;
         let degraded = Arc::clone(work.degraded(condition.degradation())?);
         match &condition.enhancer {

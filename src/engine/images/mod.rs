@@ -5,14 +5,14 @@
 //! and condition. The [`image_pipeline`] makes the images of each condition once, by a [`recipes::Recipe`], for all
 //! commands that ask or write them.
 
-pub(crate) mod enhancement;
-pub(crate) mod frame_work;
-pub(crate) mod frames;
-pub(crate) mod image_pipeline;
-pub(crate) mod notes;
-pub(crate) mod progress;
-pub(crate) mod recipes;
-pub(crate) mod stored;
-pub(crate) mod timings;
-pub(crate) mod trials;
-pub(crate) mod workers;
+pub mod enhancement;
+pub mod frame_work;
+pub mod frames;
+pub mod image_pipeline;
+pub mod notes;
+pub mod progress;
+pub mod recipes;
+pub mod stored;
+pub mod timings;
+pub mod trials;
+pub mod workers;

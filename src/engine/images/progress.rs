@@ -8,12 +8,12 @@ use std::time::{Duration, Instant};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use tracing_subscriber::fmt::MakeWriter;
 
-use crate::types::text::escape_hidden;
-use crate::types::text::{hours, money};
+use darkqa_base::types::text::escape_hidden;
+use darkqa_base::types::text::{hours, money};
 
 /// Progress on standard error: bars on a terminal, otherwise one line a minute about the trials.
 #[derive(Debug, Clone)]
-pub(crate) struct Progress {
+pub struct Progress {
     bars: MultiProgress,
     form: ProgressForm,
 }
@@ -27,11 +27,11 @@ enum ProgressForm {
 }
 
 /// Time between two lines of progress.
-pub(crate) const LINE_INTERVAL: Duration = Duration::from_mins(1);
+pub const LINE_INTERVAL: Duration = Duration::from_mins(1);
 
 /// Whether progress is shown (`--quiet`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Verbosity {
+pub enum Verbosity {
     /// Show progress; the default.
     Normal,
     /// Show no progress.
@@ -41,7 +41,7 @@ pub(crate) enum Verbosity {
 impl Progress {
     /// Progress on standard error.
     #[must_use]
-    pub(crate) fn new(verbosity: Verbosity) -> Self {
+    pub fn new(verbosity: Verbosity) -> Self {
         let form = match verbosity {
             Verbosity::Quiet => ProgressForm::Nothing,
             Verbosity::Normal if io::stderr().is_terminal() => ProgressForm::Bars,
@@ -56,19 +56,19 @@ impl Progress {
 
     /// Prints one line above the bars. Nothing is printed without bars: if standard error is not a terminal, or with
     /// `--quiet`.
-    pub(crate) fn print_on_terminal(&self, line: &str) {
+    pub fn print_on_terminal(&self, line: &str) {
         // A line that cannot be printed is no reason to stop.
         let _ = self.bars.println(line);
     }
 
     /// Prints one line in all cases: above the bars, into a pipe, and with `--quiet`.
-    pub(crate) fn note(&self, line: &str) {
+    pub fn note(&self, line: &str) {
         // A line that cannot be printed is no reason to stop.
         let _ = writeln!(self.make_writer(), "{line}");
     }
 
     /// A plain bar for a step of known length.
-    pub(crate) fn bar(&self, what: &'static str, length: usize) -> StepBar {
+    pub fn bar(&self, what: &'static str, length: usize) -> StepBar {
         let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}");
         let bar = self.bars.add(ProgressBar::new(length as u64).with_message(what));
         let bar = style.map_or(bar.clone(), |style| bar.with_style(style));
@@ -78,7 +78,7 @@ impl Progress {
     }
 
     /// The progress of the trials: answered, failed, cost, rate, remaining time.
-    pub(crate) fn trials(&self, trials: usize, answered: usize) -> TrialProgress {
+    pub fn trials(&self, trials: usize, answered: usize) -> TrialProgress {
         let bar = ProgressBar::new(trials as u64).with_position(answered as u64);
         let bar = self.bars.add(bar);
         bar.reset_eta();
@@ -103,14 +103,14 @@ fn rate(state: &ProgressState, out: &mut dyn fmt::Write) {
 }
 
 /// The bar of one step, removed when it is dropped.
-pub(crate) struct StepBar(ProgressBar);
+pub struct StepBar(ProgressBar);
 
 impl StepBar {
-    pub(crate) fn inc(&self) {
+    pub fn inc(&self) {
         self.0.inc(1);
     }
 
-    pub(crate) fn advance(&self, steps: usize) {
+    pub fn advance(&self, steps: usize) {
         self.0.inc(steps as u64);
     }
 }
@@ -122,7 +122,7 @@ impl Drop for StepBar {
 }
 
 /// The progress of the trials, as a bar or as lines.
-pub(crate) struct TrialProgress {
+pub struct TrialProgress {
     bar: StepBar,
     /// The lines; `None` unless they are printed.
     lines: Option<Mutex<TrialLines>>,
@@ -131,7 +131,7 @@ pub(crate) struct TrialProgress {
 
 impl TrialProgress {
     /// Shows the numbers of answered and failed trials, the US dollars spent, and a note about the request rate.
-    pub(crate) fn count(&self, answered: usize, failed: usize, spent: Option<f64>, pace: &str) {
+    pub fn count(&self, answered: usize, failed: usize, spent: Option<f64>, pace: &str) {
         if let Some(lines) = &self.lines {
             let mut lines = lines.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some(line) = lines.next_line(answered, failed, spent, pace, Instant::now()) {
@@ -191,7 +191,7 @@ impl TrialLines {
 
 /// Writer of log lines to standard error, above the bars.
 #[derive(Debug)]
-pub(crate) struct LogWriter(MultiProgress);
+pub struct LogWriter(MultiProgress);
 
 impl Write for LogWriter {
     /// Writes a line with hidden characters escaped, because it may quote a file. Errors of a closed terminal or pipe

@@ -11,15 +11,15 @@ use std::time::{Duration, Instant};
 use super::frames::Frames;
 use super::recipes::Recipe;
 use super::stored::{Needed, Similarity, StoredImage, StoredImages, StoredNotes, StoredPlace};
-use crate::ask::{HeldBack, ImageLimit};
-use crate::error::Result;
-use crate::pictures::Payload;
-use crate::types::manifests::PngForm;
-use crate::types::{ExposureFacts, InputNote, Rgb};
+use darkqa_ask::{HeldBack, ImageLimit};
+use darkqa_base::error::Result;
+use darkqa_base::types::manifests::PngForm;
+use darkqa_base::types::{ExposureFacts, InputNote, Rgb};
+use darkqa_pictures::Payload;
 
 /// A step of the image pipeline, or a state of the request queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum TimedStep {
+pub enum TimedStep {
     /// Reading and decoding of a file.
     Decode,
     /// Reduction of light and addition of noise.
@@ -53,20 +53,20 @@ impl TimedStep {
 
 /// Time of each step, summed over threads.
 #[derive(Debug, Default)]
-pub(crate) struct Timings {
+pub struct Timings {
     nanoseconds: [AtomicU64; TimedStep::ALL.len()],
 }
 
 impl Timings {
     /// Runs `action` and adds its time to a step.
-    pub(crate) fn time<T>(&self, step: TimedStep, action: impl FnOnce() -> T) -> T {
+    pub fn time<T>(&self, step: TimedStep, action: impl FnOnce() -> T) -> T {
         let started = Instant::now();
         let result = action();
         self.add(step, started.elapsed());
         result
     }
 
-    pub(crate) fn add(&self, step: TimedStep, time: Duration) {
+    pub fn add(&self, step: TimedStep, time: Duration) {
         self.nanoseconds[step as usize].fetch_add(time.as_nanos() as u64, Ordering::Relaxed);
     }
 
@@ -77,7 +77,7 @@ impl Timings {
     /// One line with the time of each step and the bottleneck of a run that took this time on `threads` threads.
     /// `held_back` is the time for which requests had to wait for their turn. `has_endpoint` is false if every model is
     /// built in.
-    pub(crate) fn summary(&self, took: Duration, threads: usize, held_back: HeldBack, has_endpoint: bool) -> String {
+    pub fn summary(&self, took: Duration, threads: usize, held_back: HeldBack, has_endpoint: bool) -> String {
         TimingsText { timings: self, took: took.as_secs_f64(), threads, held_back, has_endpoint }.to_string()
     }
 }
@@ -139,42 +139,43 @@ impl fmt::Display for TimingsText<'_> {
 
 /// Frame files, recipe, endpoint limit, timings and image store that all images share.
 #[derive(Clone, Copy)]
-pub(crate) struct ImageSteps<'a> {
-    pub(crate) frames: &'a dyn Frames,
-    pub(crate) recipe: &'a Recipe,
+pub struct ImageSteps<'a> {
+    pub frames: &'a dyn Frames,
+    pub recipe: &'a Recipe,
     /// Largest image that the endpoint accepts; `None` if all models are built in.
-    pub(crate) limit: Option<ImageLimit>,
-    pub(crate) timings: &'a Timings,
+    pub limit: Option<ImageLimit>,
+    pub timings: &'a Timings,
     /// The form of PNG files.
-    pub(crate) png: PngForm,
+    pub png: PngForm,
     /// The image store; `None` without one.
-    pub(crate) stored: Option<StoredImages<'a>>,
+    pub stored: Option<StoredImages<'a>>,
 }
 
 impl ImageSteps<'_> {
     /// The same steps without the image store.
-    pub(crate) fn without_store(self) -> Self {
+    #[must_use]
+    pub fn without_store(self) -> Self {
         Self { stored: None, ..self }
     }
 
     /// Reads an image from the store; `None` if it or a needed fact is missing.
-    pub(crate) fn stored_image(&self, place: &StoredPlace<'_>, needed: Needed) -> Option<StoredImage> {
+    pub fn stored_image(&self, place: &StoredPlace<'_>, needed: Needed) -> Option<StoredImage> {
         self.timings.time(TimedStep::Decode, || place.read(self.recipe, needed))
     }
 
     /// Similarity of an image to its clean frame, if the store has it without the image.
-    pub(crate) fn stored_similarity(&self, place: &StoredPlace<'_>) -> Option<Similarity> {
+    pub fn stored_similarity(&self, place: &StoredPlace<'_>) -> Option<Similarity> {
         self.timings.time(TimedStep::Decode, || place.similarity())
     }
 
     /// Adds an image to the store. `took` is the time that it took to make.
-    pub(crate) fn store(&self, place: &StoredPlace<'_>, image: &Payload, notes: &StoredNotes, took: Duration) {
+    pub fn store(&self, place: &StoredPlace<'_>, image: &Payload, notes: &StoredNotes, took: Duration) {
         self.timings.time(TimedStep::Encode, || place.write(image, notes, took));
     }
 
     /// Adds the facts that the store does not keep to an image from it: how its frame was read (`note`), and the
     /// camera's exposure.
-    pub(crate) fn stored_payload(
+    pub fn stored_payload(
         &self,
         payload: Payload,
         note: &InputNote,
@@ -185,7 +186,7 @@ impl ImageSteps<'_> {
     }
 
     /// Scales and encodes an image; returns the payload and the scaled pixels. `note` tells how its frame was read.
-    pub(crate) fn payload(
+    pub fn payload(
         &self,
         image: &Arc<Rgb>,
         note: &InputNote,
@@ -201,7 +202,7 @@ impl ImageSteps<'_> {
     }
 
     /// Scales an image to the size sent. An image that already has that size is shared, not copied.
-    pub(crate) fn scaled(&self, image: &Arc<Rgb>) -> Result<Arc<Rgb>> {
+    pub fn scaled(&self, image: &Arc<Rgb>) -> Result<Arc<Rgb>> {
         Ok(match self.recipe.scaling.scale(image)? {
             Cow::Borrowed(_) => Arc::clone(image),
             Cow::Owned(scaled) => Arc::new(scaled),
@@ -210,7 +211,7 @@ impl ImageSteps<'_> {
 
     /// # Errors
     /// If the image is larger than the endpoint accepts.
-    pub(crate) fn check_size(&self, payload: Payload) -> Result<Arc<Payload>> {
+    pub fn check_size(&self, payload: Payload) -> Result<Arc<Payload>> {
         if let Some(limit) = &self.limit {
             limit.check(payload.facts())?;
         }
@@ -221,7 +222,7 @@ impl ImageSteps<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ask::PaceCause;
+    use darkqa_ask::PaceCause;
 
     /// The summary of a run of 10 s on 2 threads, with these seconds per step.
     fn summary(steps: &[(TimedStep, u64)]) -> String {
@@ -237,7 +238,8 @@ mod tests {
         let line = |cause, seconds| {
             let timings = Timings::default();
             timings.add(TimedStep::Full, Duration::from_secs(8));
-            let held_back = HeldBack::seconds(cause, seconds);
+            let mut held_back = HeldBack::default();
+            held_back.add(cause, Duration::from_secs(seconds));
             timings.summary(Duration::from_secs(10), 2, held_back, true)
         };
         let stated = line(PaceCause::ReportedLimits, 5);

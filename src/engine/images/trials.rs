@@ -21,20 +21,20 @@ use rayon::prelude::*;
 
 use super::notes::ImageNotes;
 use super::progress::Progress;
-use crate::ask::{ImagePlaces, Message, Query};
-use crate::data::{
-    Bank, BankArgs, BankSource, DataSource, Dataset, Photographs, SceneArgs, SelectionArgs, SetArgs, SkipBad,
-};
-use crate::error::{Error, Result};
-use crate::files;
-use crate::pictures::{DecodeRule, Payload};
-use crate::types::text::counted;
-use crate::types::{
+use darkqa_ask::{ImagePlaces, Message, Query};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{
     Condition, Degradation, Digest, EnhancerName, Family, FrameId, PairDark, PhotoName, Question, Record, Treatment,
     TreatmentSet, TrialKey,
 };
+use darkqa_data::{
+    Bank, BankArgs, BankSource, DataSource, Dataset, Photographs, SceneArgs, SelectionArgs, SetArgs, SkipBad,
+};
 use darkqa_enhance::EnhancerArgs;
 use darkqa_light::LightSettings;
+use darkqa_pictures::{DecodeRule, Payload};
 use darkqa_questions::balance::BalanceMode;
 use darkqa_questions::colors::Palette;
 use darkqa_questions::room::RoomSource;
@@ -45,7 +45,7 @@ use darkqa_score::answers::record::Detail;
 
 /// All conditions in which a frame is shown: level by level, then its matches and photographs in the dark; each one
 /// first raw, then with every enhancer. In this order a frame is degraded once for all enhancers.
-pub(crate) fn conditions(
+pub fn conditions(
     light: &LightSettings,
     photographs: &[PhotoName],
     on: TreatmentSet,
@@ -70,7 +70,7 @@ pub(crate) fn conditions(
 ///
 /// # Errors
 /// [`Error::Usage`], which suggests the value of `--llie-on` that would use them.
-pub(crate) fn check_used(light: &LightSettings, args: &EnhancerArgs) -> Result<()> {
+pub fn check_used(light: &LightSettings, args: &EnhancerArgs) -> Result<()> {
     let degradations = light.degradations();
     let Some(asked) = degradations
         .iter()
@@ -98,7 +98,7 @@ pub(crate) fn check_used(light: &LightSettings, args: &EnhancerArgs) -> Result<(
 ///
 /// # Errors
 /// [`Error::Usage`] if enhancers are named and no condition uses one.
-pub(crate) fn check_enhanced(conditions: &[Condition], args: &EnhancerArgs) -> Result<()> {
+pub fn check_enhanced(conditions: &[Condition], args: &EnhancerArgs) -> Result<()> {
     let is_used = conditions.iter().any(|condition| condition.enhancer.is_some());
     if args.is_empty() || is_used || conditions.is_empty() {
         return Ok(());
@@ -112,10 +112,10 @@ pub(crate) fn check_enhanced(conditions: &[Condition], args: &EnhancerArgs) -> R
 
 /// The trials about one source that share their images, or have none.
 #[derive(Debug)]
-pub(crate) struct TrialGroup<I> {
+pub struct TrialGroup<I> {
     /// Condition of the images; `None` if only text is sent.
-    pub(crate) condition: Option<Condition>,
-    pub(crate) trials: Vec<Trial<I>>,
+    pub condition: Option<Condition>,
+    pub trials: Vec<Trial<I>>,
 }
 
 impl<I> TrialGroup<I> {
@@ -126,15 +126,15 @@ impl<I> TrialGroup<I> {
 
 /// All groups about one source.
 #[derive(Debug)]
-pub(crate) struct SourcePlan<I> {
+pub struct SourcePlan<I> {
     /// Index of the source among those of the run.
-    pub(crate) source: usize,
-    pub(crate) groups: Vec<TrialGroup<I>>,
+    pub source: usize,
+    pub groups: Vec<TrialGroup<I>>,
 }
 
 impl<I> SourcePlan<I> {
     /// The conditions in which the source is shown.
-    pub(crate) fn conditions(&self) -> impl Iterator<Item = &Condition> {
+    pub fn conditions(&self) -> impl Iterator<Item = &Condition> {
         self.groups.iter().filter_map(|group| group.condition.as_ref())
     }
 
@@ -153,18 +153,18 @@ impl<I> SourcePlan<I> {
 
 /// The trials of one phase of a run, and the ones that remain to be asked.
 #[derive(Debug)]
-pub(crate) struct Plan<I> {
+pub struct Plan<I> {
     /// Keys of all trials, answered or not, source by source.
-    pub(crate) keys: Vec<TrialKey>,
+    pub keys: Vec<TrialKey>,
     /// Number of trials, answered or not, by source index.
-    pub(crate) by_source: BTreeMap<usize, usize>,
+    pub by_source: BTreeMap<usize, usize>,
     /// The trials that remain to be asked, in the same order.
-    pub(crate) sources: Vec<SourcePlan<I>>,
+    pub sources: Vec<SourcePlan<I>>,
 }
 
 impl<I> Plan<I> {
     /// A plan in which all trials remain to be asked.
-    pub(crate) fn new(sources: Vec<SourcePlan<I>>) -> Self {
+    pub fn new(sources: Vec<SourcePlan<I>>) -> Self {
         let mut plan = Self { keys: Vec::new(), by_source: BTreeMap::new(), sources: Vec::new() };
         for source in sources {
             plan.add(source, |_| false);
@@ -173,7 +173,7 @@ impl<I> Plan<I> {
     }
 
     /// Adds the trials about a source. Those that `is_excluded` accepts need not be asked.
-    pub(crate) fn add(&mut self, mut source: SourcePlan<I>, is_excluded: impl Fn(&TrialKey) -> bool) {
+    pub fn add(&mut self, mut source: SourcePlan<I>, is_excluded: impl Fn(&TrialKey) -> bool) {
         self.keys.extend(source.groups.iter().flat_map(|group| &group.trials).map(|trial| trial.key));
         *self.by_source.entry(source.source).or_default() += source.trial_count();
         source.exclude(is_excluded);
@@ -183,7 +183,7 @@ impl<I> Plan<I> {
     }
 
     /// Removes the trials that need not be asked; returns their number.
-    pub(crate) fn exclude(&mut self, is_excluded: impl Fn(&TrialKey) -> bool) -> usize {
+    pub fn exclude(&mut self, is_excluded: impl Fn(&TrialKey) -> bool) -> usize {
         let before = self.remaining();
         for source in &mut self.sources {
             source.exclude(&is_excluded);
@@ -193,7 +193,7 @@ impl<I> Plan<I> {
     }
 
     /// Adds the wanted images of all groups that are not in the plan, without trials.
-    pub(crate) fn add_images(&mut self, all: Vec<SourcePlan<I>>, is_wanted: impl Fn(usize, &Condition) -> bool) {
+    pub fn add_images(&mut self, all: Vec<SourcePlan<I>>, is_wanted: impl Fn(usize, &Condition) -> bool) {
         let positions: BTreeMap<usize, usize> = self.sources.iter().map(|part| part.source).zip(0..).collect();
         for SourcePlan { source, groups } in all {
             let position = positions.get(&source).copied();
@@ -216,7 +216,7 @@ impl<I> Plan<I> {
     /// Moves groups of untouched images to the front until they have at least `trials` trials, because these show
     /// whether a server looks at the images at all. Nothing is moved if fewer than `min_trials` exist. Only groups of
     /// sources for which `is_cheap` is true are moved, because the frames of a moved group are read twice.
-    pub(crate) fn ask_untouched_first(&mut self, min_trials: usize, trials: usize, is_cheap: impl Fn(usize) -> bool) {
+    pub fn ask_untouched_first(&mut self, min_trials: usize, trials: usize, is_cheap: impl Fn(usize) -> bool) {
         let available: usize =
             self.groups().filter(|(_, group)| group.is_untouched()).map(|(_, group)| group.trials.len()).sum();
         if available < min_trials {
@@ -238,22 +238,22 @@ impl<I> Plan<I> {
     }
 
     /// Number of trials that remain to be asked and whose keys satisfy `is_counted`.
-    pub(crate) fn remaining_where(&self, is_counted: impl Fn(&TrialKey) -> bool) -> usize {
+    pub fn remaining_where(&self, is_counted: impl Fn(&TrialKey) -> bool) -> usize {
         self.groups().flat_map(|(_, group)| &group.trials).filter(|trial| is_counted(&trial.key)).count()
     }
 
     /// Number of trials that remain to be asked.
-    pub(crate) fn remaining(&self) -> usize {
+    pub fn remaining(&self) -> usize {
         self.sources.iter().map(SourcePlan::trial_count).sum()
     }
 
     /// The conditions of the remaining trials.
-    pub(crate) fn conditions(&self) -> BTreeSet<&Condition> {
+    pub fn conditions(&self) -> BTreeSet<&Condition> {
         self.sources.iter().flat_map(SourcePlan::conditions).collect()
     }
 
     /// The groups of the remaining trials, each with the index of its source.
-    pub(crate) fn groups(&self) -> impl Iterator<Item = (usize, &TrialGroup<I>)> {
+    pub fn groups(&self) -> impl Iterator<Item = (usize, &TrialGroup<I>)> {
         self.sources.iter().flat_map(|part| part.groups.iter().map(|group| (part.source, group)))
     }
 }
@@ -262,7 +262,7 @@ impl<I> Plan<I> {
 ///
 /// # Errors
 /// If the file cannot be read, or is not a rulebook.
-pub(crate) fn rules(path: Option<&Path>) -> Result<Rules> {
+pub fn rules(path: Option<&Path>) -> Result<Rules> {
     let Some(path) = path else {
         return Rules::built_in();
     };
@@ -270,14 +270,14 @@ pub(crate) fn rules(path: Option<&Path>) -> Result<Rules> {
 }
 
 /// Notes of the families whose rules are the built-in ones, because the user's rulebook does not have them.
-pub(crate) fn note_built_in_families(rules: &Rules, progress: &Progress) {
+pub fn note_built_in_families(rules: &Rules, progress: &Progress) {
     for family in rules.built_in_families() {
         progress.note(&format!("--rules: no table [{family}] in this file; the built-in one is used"));
     }
 }
 
 /// Opens the data at a place. If they have no questions, generates them by rule.
-pub(crate) fn open_data(
+pub fn open_data(
     place: &DataSource,
     scene: &SceneArgs,
     set: &SetArgs,
@@ -320,7 +320,7 @@ fn skip_unusable(dataset: Dataset, skip: Option<SkipBad>, progress: &Progress) -
 }
 
 /// Opens the data at a place with their own questions. No image is read.
-pub(crate) fn open_without_generating(
+pub fn open_without_generating(
     place: &DataSource,
     scene: &SceneArgs,
     set: &SetArgs,
@@ -332,11 +332,11 @@ pub(crate) fn open_without_generating(
 }
 
 /// Field of a run's identity with the digest of the question bank.
-pub(crate) const ASK: &str = "--ask";
+pub const ASK: &str = "--ask";
 
 /// Questions that are asked about every image and have no known answers (`--ask`).
 #[derive(Debug)]
-pub(crate) struct QuestionBank {
+pub struct QuestionBank {
     place: BankSource,
     bank: Bank,
     /// Number of questions to ask about each image; `None` for all.
@@ -348,7 +348,7 @@ impl QuestionBank {
     ///
     /// # Errors
     /// If the file cannot be read, or a line is not a valid question.
-    pub(crate) fn open(args: &BankArgs) -> Result<Option<Self>> {
+    pub fn open(args: &BankArgs) -> Result<Option<Self>> {
         let Some(place) = &args.ask else {
             return Ok(None);
         };
@@ -359,18 +359,18 @@ impl QuestionBank {
     ///
     /// # Errors
     /// None in practice: the questions are text.
-    pub(crate) fn digest(&self) -> Result<Digest> {
+    pub fn digest(&self) -> Result<Digest> {
         self.bank.digest()
     }
 
     /// Description for the manifest: the name of the bank and the number of questions per image.
-    pub(crate) fn description(&self) -> String {
-        format!("{}: {} of {} questions about each image", self.place, self.questions_per_image(), self.bank.len())
+    pub fn description(&self) -> String {
+        format!("{}: {} of {} questions about each image", self.place, self.questions_per_image(), self.bank.count())
     }
 
     /// Number of questions asked about each image.
-    pub(crate) fn questions_per_image(&self) -> usize {
-        let all = self.bank.len();
+    pub fn questions_per_image(&self) -> usize {
+        let all = self.bank.count();
         self.per_image.map_or(all, |count| count.get().min(all))
     }
 
@@ -379,7 +379,7 @@ impl QuestionBank {
     ///
     /// # Errors
     /// If the place has no image.
-    pub(crate) fn open_images(
+    pub fn open_images(
         &self,
         place: &DataSource,
         set: &SetArgs,
@@ -411,7 +411,7 @@ impl QuestionBank {
 }
 
 /// Selects the first `--limit` questions of the chosen families.
-pub(crate) fn select(mut questions: Vec<Question>, selection: &SelectionArgs) -> Result<Vec<Question>> {
+pub fn select(mut questions: Vec<Question>, selection: &SelectionArgs) -> Result<Vec<Question>> {
     let wanted = &selection.families;
     let present: BTreeSet<&Family> = questions.iter().map(|question| &question.family).collect();
     if let Some(missing) = wanted.iter().find(|family| !present.contains(family)) {
@@ -467,7 +467,7 @@ fn generate_by_rule(dataset: &Dataset, rules: &Rules, progress: &Progress) -> Re
 }
 
 /// Subject of a trial: a question with choices, an open question, or an answer to judge.
-pub(crate) trait Item: Clone + Send + Sync + 'static {
+pub trait Item: Clone + Send + Sync + 'static {
     /// Fields that this kind of item adds to a record.
     type Detail: Detail;
 
@@ -490,47 +490,48 @@ pub(crate) trait Item: Clone + Send + Sync + 'static {
 
 /// One item for one model.
 #[derive(Debug, Clone)]
-pub(crate) struct Trial<I> {
-    pub(crate) key: TrialKey,
+pub struct Trial<I> {
+    pub key: TrialKey,
     /// Index of the model among those of the phase.
-    pub(crate) model: usize,
-    pub(crate) prompt: Prompt,
-    pub(crate) item: I,
+    pub model: usize,
+    pub prompt: Prompt,
+    pub item: I,
 }
 
 /// The text of a trial.
 #[derive(Debug, Clone)]
-pub(crate) struct Prompt {
+pub struct Prompt {
     /// Text before the images.
-    pub(crate) before: Arc<str>,
+    pub before: Arc<str>,
     /// Text after the images; `None` if there is none.
-    pub(crate) after: Option<Arc<str>>,
+    pub after: Option<Arc<str>>,
     /// Where the images are placed in the text.
-    pub(crate) places: ImagePlaces,
+    pub places: ImagePlaces,
 }
 
 impl Prompt {
     /// A prompt whose whole text is before the images.
-    pub(crate) fn from_text(text: Arc<str>) -> Self {
+    pub fn from_text(text: Arc<str>) -> Self {
         Self { before: text, after: None, places: ImagePlaces::Together }
     }
 
     /// A prompt whose whole text is after the images.
-    pub(crate) fn after_images(text: Arc<str>) -> Self {
+    pub fn after_images(text: Arc<str>) -> Self {
         Self { before: Arc::from(""), after: Some(text), places: ImagePlaces::Together }
     }
 
     /// The same prompt with images in these places.
-    pub(crate) fn with_places(self, places: ImagePlaces) -> Self {
+    #[must_use]
+    pub fn with_places(self, places: ImagePlaces) -> Self {
         Self { places, ..self }
     }
 
     /// The text before and after the images; the second is empty if there is none.
-    pub(crate) fn parts(&self) -> [&str; 2] {
+    pub fn parts(&self) -> [&str; 2] {
         [&self.before, self.after.as_deref().unwrap_or_default()]
     }
 
-    pub(crate) fn message<'a>(&'a self, images: &'a [Arc<Payload>]) -> Message<'a> {
+    pub fn message<'a>(&'a self, images: &'a [Arc<Payload>]) -> Message<'a> {
         let [before, after] = self.parts();
         Message { before, images, after, places: self.places }
     }
@@ -538,22 +539,22 @@ impl Prompt {
 
 /// The images that the trials of one group share; by default none.
 #[derive(Debug, Default)]
-pub(crate) struct Stimulus {
+pub struct Stimulus {
     /// Condition of the images; `None` without images.
-    pub(crate) condition: Option<Condition>,
-    pub(crate) images: Vec<Arc<Payload>>,
+    pub condition: Option<Condition>,
+    pub images: Vec<Arc<Payload>>,
 }
 
 /// A stimulus with its trials, as the image pipeline sends it.
 #[derive(Debug)]
-pub(crate) struct PreparedGroup<I> {
+pub struct PreparedGroup<I> {
     /// Images of the group; none if one of them could not be made.
-    pub(crate) stimulus: Stimulus,
-    pub(crate) trials: Vec<Trial<I>>,
+    pub stimulus: Stimulus,
+    pub trials: Vec<Trial<I>>,
     /// Reason why the images could not be made; else `None`.
-    pub(crate) problem: Option<Error>,
+    pub problem: Option<Error>,
     /// Notes about the images for the report.
-    pub(crate) notes: ImageNotes,
+    pub notes: ImageNotes,
 }
 
 #[cfg(test)]
@@ -561,7 +562,7 @@ mod tests {
     use clap::Parser;
 
     use super::*;
-    use crate::types::SetLight;
+    use darkqa_base::types::SetLight;
     use darkqa_light::LightArgs;
 
     #[derive(Parser)]

@@ -5,13 +5,13 @@ use std::num::NonZeroUsize;
 use clap::Args;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::error::{Error, Result};
-use crate::types::Decides;
-use crate::types::flags::threads;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Decides;
+use darkqa_base::types::flags::threads;
 
 /// The flag `--threads`.
 #[derive(Debug, Clone, Copy, Default, Args)]
-pub(crate) struct ThreadArgs {
+pub struct ThreadArgs {
     /// Threads for synthesis, enhancement and reading, 1024 at most; default: all cores, or as many as a control group
     /// allows (Slurm, containers)
     #[arg(long, value_name = "N", value_parser = threads, help_heading = "Scale", add = Decides::Nothing)]
@@ -20,16 +20,16 @@ pub(crate) struct ThreadArgs {
 
 impl ThreadArgs {
     /// Number of threads; by default one per core.
-    pub(crate) fn count(self) -> usize {
+    pub fn count(self) -> usize {
         self.threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, NonZeroUsize::get)
     }
 }
 
 /// Thread pools: one of all threads, for work on one source together, and pools of one thread each, for one source per
 /// worker.
-pub(crate) struct Workers {
-    pub(crate) shared: ThreadPool,
-    pub(crate) single_threaded: Vec<ThreadPool>,
+pub struct Workers {
+    pub shared: ThreadPool,
+    pub single_threaded: Vec<ThreadPool>,
 }
 
 impl Workers {
@@ -37,7 +37,7 @@ impl Workers {
     ///
     /// # Errors
     /// If the operating system refuses to start them.
-    pub(crate) fn start(threads: Option<NonZeroUsize>) -> Result<Self> {
+    pub fn start(threads: Option<NonZeroUsize>) -> Result<Self> {
         let shared = pool(threads)?;
         let single_threaded =
             (0..shared.current_num_threads()).map(|_| pool(Some(NonZeroUsize::MIN))).collect::<Result<_>>()?;
@@ -49,12 +49,12 @@ impl Workers {
 ///
 /// # Errors
 /// If the operating system refuses to start them.
-pub(crate) fn pool(threads: Option<NonZeroUsize>) -> Result<ThreadPool> {
+pub fn pool(threads: Option<NonZeroUsize>) -> Result<ThreadPool> {
     let threads = threads.map_or(0, NonZeroUsize::get);
     ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| thread_start_error(&e))
 }
 
 /// The error for a thread that the operating system refused to start.
-pub(crate) fn thread_start_error(problem: &dyn std::fmt::Display) -> Error {
+pub fn thread_start_error(problem: &dyn std::fmt::Display) -> Error {
     Error::usage("--threads", format_args!("cannot be started: {problem}"))
 }

@@ -3,36 +3,36 @@
 use clap::builder::Resettable;
 use clap::{ArgAction, Args, Command, FromArgMatches as _, value_parser};
 
-use crate::ask::{AccessArgs, Constrain, Parameters, RequestArgs, Sending};
-use crate::error::{Error, Result};
+use darkqa_ask::{AccessArgs, Constrain, Parameters, RequestArgs, Sending};
+use darkqa_base::error::{Error, Result};
 
 /// How a model is asked: the flags, and the same settings in a file of models.
 #[derive(Debug, Clone, Args)]
-pub(crate) struct AskingArgs {
+pub struct AskingArgs {
     /// Parameters of the model.
     #[command(flatten)]
-    pub(crate) parameters: Parameters,
+    pub parameters: Parameters,
     /// Fields added to requests or left out.
     #[command(flatten)]
-    pub(crate) request: RequestArgs,
+    pub request: RequestArgs,
     /// Endpoint and its key.
     #[command(flatten)]
-    pub(crate) access: AccessArgs,
+    pub access: AccessArgs,
     /// Concurrency, timeouts, retries and rate limits.
     #[command(flatten)]
-    pub(crate) sending: Sending,
+    pub sending: Sending,
     /// The constraint on replies.
     #[arg(long, value_enum, default_value_t)]
-    pub(crate) constrain: Constrain,
+    pub constrain: Constrain,
     /// Whether the probabilities of choices are asked for.
     #[arg(long)]
-    pub(crate) probabilities: bool,
+    pub probabilities: bool,
     /// The seed of the server's sampling.
     #[arg(long)]
-    pub(crate) seed: Option<u64>,
+    pub seed: Option<u64>,
     /// Names of headers that decide replies.
     #[arg(long)]
-    pub(crate) reply_headers: Vec<String>,
+    pub reply_headers: Vec<String>,
 }
 
 impl AskingArgs {
@@ -40,7 +40,7 @@ impl AskingArgs {
     ///
     /// # Errors
     /// None in practice: every flag has a default.
-    pub(crate) fn defaults() -> Result<Self> {
+    pub fn defaults() -> Result<Self> {
         let command = Self::augment_args(Command::new("model").no_binary_name(true));
         let matches = command.try_get_matches_from([""; 0]);
         let args = matches.and_then(|matches| Self::from_arg_matches(&matches));

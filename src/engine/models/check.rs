@@ -9,13 +9,13 @@ use serde_json::Value;
 
 use super::settings::{AskSettings, ModelSettings};
 use super::{endpoint, open};
-use crate::ask::{Call, ImagePlaces, Message, Model, Query};
-use crate::engine::images::progress::Progress;
-use crate::engine::images::workers::thread_start_error;
-use crate::error::{Error, Result};
-use crate::pictures::{Payload, PayloadFormat};
-use crate::types::text::counted;
-use crate::types::{Condition, QuestionId, Rgb, View};
+use crate::images::progress::Progress;
+use crate::images::workers::thread_start_error;
+use darkqa_ask::{Call, ImagePlaces, Message, Model, Query};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{Condition, QuestionId, Rgb, View};
+use darkqa_pictures::{Payload, PayloadFormat};
 
 /// A question for a model without images.
 const TEXT_QUESTION: &str = "Is snow cold?\nA. yes\nB. no\nAnswer with the letter of one choice.";
@@ -34,7 +34,7 @@ const SIDE: usize = 64;
 ///
 /// # Errors
 /// If a model cannot be opened.
-pub(crate) fn check(ask: &AskSettings, progress: &Progress) -> Result<Vec<(String, Result<String, String>)>> {
+pub fn check(ask: &AskSettings, progress: &Progress) -> Result<Vec<(String, Result<String, String>)>> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     let runtime = runtime.map_err(|e| thread_start_error(&e))?;
     let image = Rgb::new(SIDE, SIDE, RED.repeat(SIDE * SIDE))?;
@@ -83,7 +83,7 @@ pub(crate) fn check(ask: &AskSettings, progress: &Progress) -> Result<Vec<(Strin
 ///
 /// # Errors
 /// If a model cannot be opened.
-pub(crate) fn describe(ask: &AskSettings) -> Result<String> {
+pub fn describe(ask: &AskSettings) -> Result<String> {
     let mut text = String::new();
     let notes = ask.file.as_ref().and_then(|file| file.resolved.as_array());
     for model in &ask.models {

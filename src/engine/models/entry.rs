@@ -12,10 +12,10 @@ use toml::Value;
 use super::asking::AskingArgs;
 use super::file::{Keys, Located, ModelsFile};
 use super::name::ModelName;
-use crate::ask::Price;
-use crate::error::{Error, Result};
-use crate::types::View;
-use crate::types::text::{did_you_mean, nearest};
+use darkqa_ask::Price;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::View;
+use darkqa_base::types::text::{did_you_mean, nearest};
 
 /// Keys of a model that do not correspond to a flag, or have another form than the flag.
 const MODEL_KEYS: [&str; 10] =
@@ -287,19 +287,19 @@ fn limit(located: &Located) -> Result<NonZeroUsize> {
 
 /// A flag of the run that a models file sets.
 #[derive(Debug)]
-pub(crate) struct RunDefault {
+pub struct RunDefault {
     /// Long name of the flag.
-    pub(crate) flag: String,
-    pub(crate) value: Value,
+    pub flag: String,
+    pub value: Value,
     /// File and line.
-    pub(crate) place: String,
+    pub place: String,
 }
 
 /// Reads the flags of the run that the `[defaults]` of a models file set.
 ///
 /// # Errors
 /// See [`ModelsFile::read`].
-pub(crate) fn run_defaults(path: &Path) -> Result<Vec<RunDefault>> {
+pub fn run_defaults(path: &Path) -> Result<Vec<RunDefault>> {
     let file = ModelsFile::read(path)?;
     Ok(file
         .defaults

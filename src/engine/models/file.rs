@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
 
-use crate::ask::{is_secret_header, is_secret_value, looks_like_key};
-use crate::error::{Error, Result};
-use crate::files;
-use crate::types::text::{TomlFault, line_at};
+use darkqa_ask::{is_secret_header, is_secret_value, looks_like_key};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::text::{TomlFault, line_at};
 
 /// The tables of a models file. Keys and values are not validated yet.
 #[derive(Debug)]

@@ -7,15 +7,15 @@ use std::str::FromStr;
 
 use clap::Args;
 
-use crate::ask::Prices;
-use crate::engine::observer;
-use crate::error::{Error, Result};
-use crate::types::text::is_nearly;
-use crate::types::{Control, Decides};
+use crate::observer;
+use darkqa_ask::Prices;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::text::is_nearly;
+use darkqa_base::types::{Control, Decides};
 
 /// A model that a flag or a models file names.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum ModelName {
+pub enum ModelName {
     /// Built-in model that guesses at random.
     Random,
     /// Built-in model that knows the frame and answers only what the degraded pixels still show; or one of its
@@ -42,7 +42,7 @@ impl ModelName {
     ///
     /// # Errors
     /// If the model answers multiple-choice questions only.
-    pub(crate) fn require_open_answers(&self) -> Result<()> {
+    pub fn require_open_answers(&self) -> Result<()> {
         let name = match self {
             Self::Random => "random",
             Self::Observer(_) => "observer",
@@ -58,7 +58,7 @@ impl ModelName {
     ///
     /// # Errors
     /// If a remote model's name contains a comma, or is close to a built-in name and not in the built-in price table.
-    pub(crate) fn check_spelling(&self) -> Result<()> {
+    pub fn check_spelling(&self) -> Result<()> {
         let Self::Remote(name) = self else {
             return Ok(());
         };
@@ -86,7 +86,7 @@ impl ModelName {
     }
 
     /// Name of the model in tables and folder names.
-    pub(crate) fn label(&self) -> String {
+    pub fn label(&self) -> String {
         match self {
             Self::Random => "random".to_owned(),
             Self::Observer(control) => observer::name(*control),
@@ -130,7 +130,7 @@ impl FromStr for ModelName {
 /// Flags that name the models to ask.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Model")]
-pub(crate) struct ModelArgs {
+pub struct ModelArgs {
     /// Model to ask, by its name at the endpoint (required, or --models); repeatable; built in: room-net (a small
     /// network that sees drawn rooms), observer (frames with maps), its controls (observer:CONTROL), random,
     /// script:FILE
@@ -158,12 +158,12 @@ pub(crate) struct ModelArgs {
 
 impl ModelArgs {
     /// True if no flag names a model or a models file.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.model.is_empty() && self.blind_model.is_empty() && self.models.is_none()
     }
 
     /// The models that flags name.
-    pub(crate) fn named(&self) -> impl Iterator<Item = &ModelName> {
+    pub fn named(&self) -> impl Iterator<Item = &ModelName> {
         self.model.iter().chain(&self.blind_model)
     }
 }

@@ -14,68 +14,68 @@ use super::entry::{ModelEntry, check_keys, flag_of};
 use super::file::{Keys, Located, ModelsFile};
 use super::name::{ModelArgs, ModelName};
 use super::trust::{self, Trust};
-use crate::ask::{AccessArgs, Parameters, Price, Sending, Server};
-use crate::engine::reply_checks::Continuation;
-use crate::error::{Error, Result};
-use crate::runs::shard::Shard;
-use crate::types::manifests::{JUDGES, Views};
-use crate::types::{ListedModel, View};
+use crate::reply_checks::Continuation;
+use darkqa_ask::{AccessArgs, Parameters, Price, Sending, Server};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::{JUDGES, Views};
+use darkqa_base::types::{ListedModel, View};
+use darkqa_runs::shard::Shard;
 
 /// One model of a run, with the settings of its requests.
 #[derive(Debug, Clone)]
-pub(crate) struct ModelSettings {
+pub struct ModelSettings {
     /// Name in records and tables.
-    pub(crate) name: String,
-    pub(crate) id: ModelName,
+    pub name: String,
+    pub id: ModelName,
     /// With or without images.
-    pub(crate) view: View,
+    pub view: View,
     /// Parameters of every request.
-    pub(crate) parameters: Parameters,
+    pub parameters: Parameters,
     /// The endpoint; `None` for a built-in model. Models with the same endpoint and rate limits share one.
-    pub(crate) server: Option<Arc<Server>>,
+    pub server: Option<Arc<Server>>,
     /// The model's own price; `None` for the price in the table.
-    pub(crate) price: Option<Price>,
+    pub price: Option<Price>,
     /// Number of questions that the model is asked; `None` for all.
-    pub(crate) limit: Option<usize>,
+    pub limit: Option<usize>,
 }
 
 /// The models of a run.
 #[derive(Debug)]
-pub(crate) struct AskSettings {
+pub struct AskSettings {
     /// Models of the models file in its order, followed by those that flags name.
-    pub(crate) models: Vec<ModelSettings>,
+    pub models: Vec<ModelSettings>,
     /// Content of the models file for the manifest; `None` without a file.
-    pub(crate) file: Option<FileNote>,
+    pub file: Option<FileNote>,
 }
 
 /// Content of a models file for the manifest.
 #[derive(Debug)]
-pub(crate) struct FileNote {
+pub struct FileNote {
     /// Resolved settings of the models that are asked, without secrets.
-    pub(crate) resolved: Value,
+    pub resolved: Value,
     /// All models of the file in its order, followed by those that flags name.
-    pub(crate) listed: Vec<ListedModel>,
+    pub listed: Vec<ListedModel>,
 }
 
 /// Inputs to [`AskSettings::resolve`] besides the flags of models and requests.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct ResolveContext<'a> {
+pub struct ResolveContext<'a> {
     /// Long names of the flags on the command line, without flags that variables or files set.
-    pub(crate) typed: &'a BTreeSet<String>,
-    pub(crate) shard: Shard,
+    pub typed: &'a BTreeSet<String>,
+    pub shard: Shard,
     /// Number of shards that run at once; `None` for all.
-    pub(crate) workers: Option<NonZeroU32>,
+    pub workers: Option<NonZeroU32>,
     /// Controls whether API keys are read.
-    pub(crate) keys: KeyUse,
+    pub keys: KeyUse,
     /// The file or folder of the data, with which a models file may have come.
-    pub(crate) data: Option<&'a Path>,
+    pub data: Option<&'a Path>,
     /// Models that are also asked without images.
-    pub(crate) text_baseline: TextBaseline,
+    pub text_baseline: TextBaseline,
 }
 
 /// Selects the models that are asked both with and without images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum TextBaseline {
+pub enum TextBaseline {
     /// Models marked by a flag or in the models file.
     #[default]
     AsMarked,
@@ -85,7 +85,7 @@ pub(crate) enum TextBaseline {
 
 /// Need for API keys.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum KeyUse {
+pub enum KeyUse {
     /// Requests are sent, so a missing key is an error.
     Needed,
     /// Nothing is sent, and no key is read.
@@ -94,7 +94,7 @@ pub(crate) enum KeyUse {
 
 impl AskSettings {
     /// The views of each model, by name.
-    pub(crate) fn views(&self) -> Views {
+    pub fn views(&self) -> Views {
         let mut views = Views::new();
         for model in &self.models {
             views.entry(model.name.clone()).or_default().insert(model.view);
@@ -107,7 +107,7 @@ impl AskSettings {
     ///
     /// # Errors
     /// [`Error::Usage`] with the flag, or the line of the file, that cannot be used.
-    pub(crate) fn resolve(args: &ModelArgs, asking: &AskingArgs, context: ResolveContext<'_>) -> Result<Self> {
+    pub fn resolve(args: &ModelArgs, asking: &AskingArgs, context: ResolveContext<'_>) -> Result<Self> {
         let view = if args.blind { View::Blind } else { View::Image };
         let file = args.models.as_deref().map(ModelsFile::read).transpose()?;
         let mut entries = match &file {
@@ -151,7 +151,7 @@ impl AskSettings {
 
     /// Adapts the settings to a stored run, so that settings that may change in it do not change its trial keys. Models
     /// whose settings the run has, under this or another name, are left as they are.
-    pub(crate) fn continue_from(&mut self, run: &Continuation) {
+    pub fn continue_from(&mut self, run: &Continuation) {
         let Some(stored) = run.columns.get("model") else {
             return;
         };
@@ -177,12 +177,12 @@ impl AskSettings {
     }
 
     /// True if the model of this name is asked with images.
-    pub(crate) fn shows_images_to(&self, id: &ModelName) -> bool {
+    pub fn shows_images_to(&self, id: &ModelName) -> bool {
         self.models.iter().any(|model| model.id == *id && model.view == View::Image)
     }
 
     /// The endpoints, each once.
-    pub(crate) fn servers(&self) -> Vec<&Arc<Server>> {
+    pub fn servers(&self) -> Vec<&Arc<Server>> {
         let mut servers: Vec<&Arc<Server>> = Vec::new();
         for server in self.models.iter().filter_map(|model| model.server.as_ref()) {
             if !servers.iter().any(|known| Arc::ptr_eq(known, server)) {

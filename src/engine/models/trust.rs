@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use super::asking::AskingArgs;
 use super::entry::ModelEntry;
 use super::file::{Keys, Located, ModelsFile};
-use crate::ask::{AccessArgs, BaseUrl, OPENAI_KEY, vendor_variables};
-use crate::error::{Error, Result};
+use darkqa_ask::{AccessArgs, BaseUrl, OPENAI_KEY, vendor_variables};
+use darkqa_base::error::{Error, Result};
 
 /// The value of `key-env` for an endpoint without keys.
 const NO_KEY: &str = "none";

@@ -7,20 +7,20 @@
 
 use serde::Serialize;
 
-use crate::report::text::words::{self, light};
-use crate::types::degradations::Axis;
-use crate::types::{AxisLevel, EnhancerName, Variant};
+use crate::text::words::{self, light};
+use darkqa_base::types::degradations::Axis;
+use darkqa_base::types::{AxisLevel, EnhancerName, Variant};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::model_in_condition::CHANCE;
 use darkqa_score::threshold::Threshold;
 
 /// Colour of axes and text, and of lines that belong to no model.
-pub(crate) const INK: [u8; 3] = [34, 34, 34];
+pub const INK: [u8; 3] = [34, 34, 34];
 
 /// Six colours, found by search. Each has a contrast with white of at least 3.1. Any two differ by a CIEDE2000 distance
 /// of at least 21 in normal, protanopic, deuteranopic and tritanopic vision (Machado, Oliveira and Fernandes 2009,
 /// severity 1).
-pub(crate) const COLOURS: [[u8; 3]; 6] = [
+pub const COLOURS: [[u8; 3]; 6] = [
     [0x01, 0x97, 0xea],
     [0x72, 0x11, 0x57],
     [0x7a, 0x82, 0x02],
@@ -31,7 +31,7 @@ pub(crate) const COLOURS: [[u8; 3]; 6] = [
 
 /// A drawn figure of a report.
 #[derive(Debug, Clone, Serialize)]
-pub(crate) struct Figure {
+pub struct Figure {
     /// Name of the figure in files.
     pub name: &'static str,
     /// Caption, with the note of the chart.
@@ -44,7 +44,7 @@ pub(crate) struct Figure {
 
 /// Panels and legend of a figure on the page, which arranges them by its width.
 #[derive(Debug, Clone, Serialize)]
-pub(crate) struct FigureParts {
+pub struct FigureParts {
     /// Title of the vertical axis of the first panel.
     pub measure: String,
     /// Empty if names are at the bars or rows.
@@ -60,7 +60,7 @@ pub(crate) struct FigureParts {
 
 /// Entry of a legend.
 #[derive(Debug, Clone, Serialize)]
-pub(crate) struct PageLine {
+pub struct PageLine {
     pub name: String,
     pub model: Option<String>,
     /// `curve`, `marks`, `flat` of a model without images, or `chance`.
@@ -71,7 +71,7 @@ pub(crate) struct PageLine {
 
 /// Panel of a figure on the page.
 #[derive(Debug, Clone, Serialize)]
-pub(crate) struct PagePanel {
+pub struct PagePanel {
     pub title: String,
     /// The model of all lines; `None` if there are several.
     pub model: Option<String>,
@@ -81,7 +81,7 @@ pub(crate) struct PagePanel {
 }
 
 /// SVG files of the figures: path in the report's folder, and contents.
-pub(crate) fn svg_files(figures: Vec<Figure>) -> impl Iterator<Item = (String, Vec<u8>)> {
+pub fn svg_files(figures: Vec<Figure>) -> impl Iterator<Item = (String, Vec<u8>)> {
     figures.into_iter().map(|figure| {
         let name = format!("figures/{}.svg", figure.name);
         (name, figure.svg.into_bytes())
@@ -90,26 +90,26 @@ pub(crate) fn svg_files(figures: Vec<Figure>) -> impl Iterator<Item = (String, V
 
 /// Number of a line's colour, dash and marker. The same number gives the same style in every figure of a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct LineStyle(pub usize);
+pub struct LineStyle(pub usize);
 
 impl LineStyle {
     /// Style of reference lines: chance, and the most frequent true answer.
-    pub(crate) const REFERENCE: Self = Self(27);
+    pub const REFERENCE: Self = Self(27);
     /// Style of the model that `--reference` draws in black.
-    pub(crate) const BLACK: Self = Self(1000);
+    pub const BLACK: Self = Self(1000);
 
     /// Style of a curve of a built-in reference model, such as the observer. References differ by dash and marker.
-    pub(crate) fn built_in(index: usize) -> Self {
+    pub fn built_in(index: usize) -> Self {
         Self(Self::BLACK.0 + 1 + index)
     }
 
     /// True if the line is drawn in the colour of axes and text, or in black.
-    pub(crate) fn is_ink(self) -> bool {
+    pub fn is_ink(self) -> bool {
         self == Self::REFERENCE || self.0 >= Self::BLACK.0
     }
 
     /// Colour of the line, as red, green and blue.
-    pub(crate) fn rgb(self) -> [u8; 3] {
+    pub fn rgb(self) -> [u8; 3] {
         match self {
             Self::BLACK => [0; 3],
             _ if self.is_ink() => INK,
@@ -120,7 +120,7 @@ impl LineStyle {
 
 /// Content of a line.
 #[derive(Debug, Clone)]
-pub(crate) enum LineContent {
+pub enum LineContent {
     /// Joined points over the levels, with their intervals.
     Curve(Vec<(AxisLevel, Estimate)>),
     /// A horizontal line: a share that does not depend on the level.
@@ -140,7 +140,7 @@ pub(crate) enum LineContent {
 /// Share of a set of photographs in the dark. Their darkness is measured, not one of the levels, so the mark is never
 /// joined to a curve of synthetic images.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct DarkMark {
+pub struct DarkMark {
     /// Lower quartile, median and upper quartile of the photographs' exposure drop, in EV.
     pub ev: [f64; 3],
     pub share: Estimate,
@@ -148,7 +148,7 @@ pub(crate) struct DarkMark {
 
 /// One line of a panel.
 #[derive(Debug, Clone)]
-pub(crate) struct PlotLine {
+pub struct PlotLine {
     /// Name in the legend. Lines with the same name share one entry.
     pub name: String,
     pub style: LineStyle,
@@ -161,7 +161,7 @@ pub(crate) struct PlotLine {
 
 /// Filter for the page's list of items: the items that a model was asked in one variant, in one family or in all.
 #[derive(Debug, Clone)]
-pub(crate) struct LineItems {
+pub struct LineItems {
     pub model: String,
     /// Variant and enhancer in words, as the list of items names them.
     pub light: String,
@@ -170,7 +170,7 @@ pub(crate) struct LineItems {
 
 impl LineItems {
     /// Selects the items of all families; `None` unless `models` has exactly one model.
-    pub(crate) fn for_model(models: &[&str], variant: &Variant, enhancer: Option<&EnhancerName>) -> Option<Self> {
+    pub fn for_model(models: &[&str], variant: &Variant, enhancer: Option<&EnhancerName>) -> Option<Self> {
         let [model] = models else {
             return None;
         };
@@ -180,14 +180,14 @@ impl LineItems {
 
 impl LineContent {
     /// Points without intervals: horizontal and vertical value.
-    pub(crate) fn points(points: Vec<[f64; 2]>) -> Self {
+    pub fn points(points: Vec<[f64; 2]>) -> Self {
         Self::Points(points.into_iter().map(|[x, y]| (x, Estimate::exact(y, 1))).collect())
     }
 }
 
 /// Values of an axis.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Scale {
+pub enum Scale {
     /// The levels of the curves, at their severities; with the light at L0 in lux, for the title, if it is known.
     Levels { lux: Option<f64> },
     /// Shares from 0 to 100 %, with a title.
@@ -204,14 +204,14 @@ pub(crate) enum Scale {
 
 impl Scale {
     /// Scale of thresholds, from 0 to the end of a ladder of levels: 9 EV for light (L5), 140 ms for motion blur.
-    pub(crate) fn thresholds(axis: Axis) -> Self {
+    pub fn thresholds(axis: Axis) -> Self {
         let (end, step, name) =
             if axis == Axis::MOTION { (140.0, 20, "threshold of motion blur") } else { (9.0, 1, "darkness threshold") };
         Self::UpTo { end, step, title: format!("{name} in {}", axis.unit) }
     }
 
     /// Title of the axis of a panel; empty for none.
-    pub(crate) fn title(&self, panel: &Panel) -> String {
+    pub fn title(&self, panel: &Panel) -> String {
         match self {
             Self::Levels { .. } => panel.axis_title(),
             Self::Percent(title) | Self::Numbers(title) => (*title).to_owned(),
@@ -223,7 +223,7 @@ impl Scale {
 
 /// One panel of a chart.
 #[derive(Debug, Clone)]
-pub(crate) struct Panel {
+pub struct Panel {
     /// Title, with the number of questions; may be empty.
     pub title: String,
     pub x: Scale,
@@ -238,13 +238,13 @@ const MAX_BARS: usize = 24;
 
 impl Panel {
     /// Panel of shares over the levels. `measure` is the title of the vertical axis, with its unit.
-    pub(crate) fn over_levels(measure: &'static str, title: String, lines: Vec<PlotLine>) -> Self {
+    pub fn over_levels(measure: &'static str, title: String, lines: Vec<PlotLine>) -> Self {
         Self { title, x: Scale::Levels { lux: None }, y: Scale::Percent(measure), lines, model: None }
     }
 
     /// Panel of counts by name, from the largest; zeros are left out. If more than [`MAX_BARS`] remain, the smallest
     /// are added up in one bar. The texts have each count with its share, as in `3 (75.0 %)`.
-    pub(crate) fn from_counts(title: &str, counts: impl Iterator<Item = (String, u64)>) -> Self {
+    pub fn from_counts(title: &str, counts: impl Iterator<Item = (String, u64)>) -> Self {
         let mut bars: Vec<(String, u64)> = counts.filter(|(_, count)| *count > 0).collect();
         bars.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
         if bars.len() > MAX_BARS {
@@ -262,13 +262,13 @@ impl Panel {
     }
 
     /// Panel of bars of shares by name, and the share that guessing would reach.
-    pub(crate) fn from_bars(title: String, bars: Vec<PlotLine>, chance: Option<f64>) -> Self {
+    pub fn from_bars(title: String, bars: Vec<PlotLine>, chance: Option<f64>) -> Self {
         let lines = bars.into_iter().chain(chance.map(PlotLine::chance)).collect();
         Self { title, x: Scale::Names, y: Scale::Percent(""), lines, model: None }
     }
 
     /// Levels of all curves of the panel, from L0.
-    pub(crate) fn levels(&self) -> Vec<AxisLevel> {
+    pub fn levels(&self) -> Vec<AxisLevel> {
         let mut levels: Vec<AxisLevel> = self
             .lines
             .iter()
@@ -283,7 +283,7 @@ impl Panel {
     }
 
     /// Largest value on an axis of levels, in their unit.
-    pub(crate) fn axis_end(&self) -> f64 {
+    pub fn axis_end(&self) -> f64 {
         let marks = self
             .lines
             .iter()
@@ -296,7 +296,7 @@ impl Panel {
     }
 
     /// Title of an axis of levels.
-    pub(crate) fn axis_title(&self) -> String {
+    pub fn axis_title(&self) -> String {
         let axis = self.levels().into_iter().find_map(AxisLevel::axis).unwrap_or(Axis::LIGHT);
         let Axis { title, unit, .. } = axis;
         let light = match self.x {
@@ -309,7 +309,7 @@ impl Panel {
     }
 
     /// Lowest and highest value of points and paths on an axis (0 horizontal, 1 vertical); `None` without any.
-    pub(crate) fn range(&self, axis: usize) -> Option<[f64; 2]> {
+    pub fn range(&self, axis: usize) -> Option<[f64; 2]> {
         self.lines
             .iter()
             .flat_map(|line| match &line.content {
@@ -322,7 +322,7 @@ impl Panel {
     }
 
     /// Name and text of each bar or range, in the order of their places.
-    pub(crate) fn places(&self) -> impl Iterator<Item = (&str, &str)> {
+    pub fn places(&self) -> impl Iterator<Item = (&str, &str)> {
         self.lines.iter().filter_map(|line| match &line.content {
             LineContent::Bar { text, .. } | LineContent::Range { text, .. } => Some((&*line.name, &**text)),
             _ => None,
@@ -330,30 +330,30 @@ impl Panel {
     }
 
     /// True if an axis has names, so that the panel needs no legend.
-    pub(crate) fn has_names(&self) -> bool {
+    pub fn has_names(&self) -> bool {
         self.x == Scale::Names || self.y == Scale::Names
     }
 }
 
 impl PlotLine {
     /// Line about no model, without items.
-    pub(crate) fn new(name: String, style: LineStyle, content: LineContent) -> Self {
+    pub fn new(name: String, style: LineStyle, content: LineContent) -> Self {
         Self { name, style, content, model: None, items: None }
     }
 
     /// Bar of a share, with its number as text.
-    pub(crate) fn bar(name: String, style: LineStyle, value: Estimate) -> Self {
+    pub fn bar(name: String, style: LineStyle, value: Estimate) -> Self {
         let text = format!("{:.1}", 100.0 * value.value);
         Self::new(name, style, LineContent::Bar { value, text })
     }
 
     /// Horizontal line at the share that guessing would reach.
-    pub(crate) fn chance(share: f64) -> Self {
+    pub fn chance(share: f64) -> Self {
         Self::new(CHANCE.to_owned(), LineStyle::REFERENCE, LineContent::Flat(share))
     }
 
     /// True if nothing of the line is drawn.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         match &self.content {
             LineContent::Curve(points) => points.is_empty(),
             LineContent::Marks(marks) => marks.is_empty(),
@@ -363,19 +363,19 @@ impl PlotLine {
         }
     }
 
-    pub(crate) fn is_curve(&self) -> bool {
+    pub fn is_curve(&self) -> bool {
         matches!(self.content, LineContent::Curve(_))
     }
 
     /// True if the line has a place of its own on an axis of names.
-    pub(crate) fn has_place(&self) -> bool {
+    pub fn has_place(&self) -> bool {
         matches!(self.content, LineContent::Bar { .. } | LineContent::Range { .. })
     }
 }
 
 /// A figure of panels with one legend.
 #[derive(Debug, Clone)]
-pub(crate) struct Chart {
+pub struct Chart {
     /// The panels, row by row.
     pub panels: Vec<Panel>,
     /// Number of panels in a row.
@@ -386,7 +386,7 @@ pub(crate) struct Chart {
 
 impl Chart {
     /// True if all panels are over levels.
-    pub(crate) fn is_over_levels(&self) -> bool {
+    pub fn is_over_levels(&self) -> bool {
         self.panels.iter().all(|panel| matches!(panel.x, Scale::Levels { .. }))
     }
 }

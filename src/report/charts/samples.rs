@@ -5,17 +5,17 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use crate::report::text::words::light;
-use crate::types::degradations::Axis;
-use crate::types::text::escape_hidden;
-use crate::types::{AxisLevel, Condition, EnhancerName, FrameId, RunGroup, Thumbnail, Variant};
+use crate::text::words::light;
+use darkqa_base::types::degradations::Axis;
+use darkqa_base::types::text::escape_hidden;
+use darkqa_base::types::{AxisLevel, Condition, EnhancerName, FrameId, RunGroup, Thumbnail, Variant};
 
 /// Table of sample images at the levels of one axis.
 #[derive(Serialize)]
-pub(crate) struct SampleTable {
+pub struct SampleTable {
     /// File name of the figure, without its extension.
     #[serde(skip)]
-    pub(crate) name: &'static str,
+    pub name: &'static str,
     levels: Vec<String>,
     rows: Vec<SampleRow>,
 }
@@ -37,7 +37,7 @@ const MAX_FRAMES: usize = 3;
 
 /// Sample images of the first frames: a table for each axis, with a row for each frame, variant and enhancer. Empty
 /// without thumbnails.
-pub(crate) fn samples_of(thumbnails: &[Thumbnail]) -> Vec<SampleTable> {
+pub fn samples_of(thumbnails: &[Thumbnail]) -> Vec<SampleTable> {
     Axis::present(|axis| thumbnails.iter().any(|thumbnail| thumbnail.condition.level().axis() == Some(axis)))
         .into_iter()
         .filter_map(|axis| {
@@ -120,7 +120,7 @@ const CELL: [usize; 2] = [200, 150];
 const HEAD: [usize; 2] = [180, 28];
 
 /// Draws a table as one SVG, with the images embedded.
-pub(crate) fn figure(samples: &SampleTable) -> String {
+pub fn figure(samples: &SampleTable) -> String {
     let size = [HEAD[0] + samples.levels.len() * (CELL[0] + 4), HEAD[1] + samples.rows.len() * (CELL[1] + 4)];
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" \
@@ -160,7 +160,7 @@ fn escape_xml(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::Digest;
+    use darkqa_base::types::Digest;
 
     /// The only table of some thumbnails.
     fn single_table(thumbnails: &[Thumbnail]) -> SampleTable {

@@ -12,10 +12,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::chart::{Chart, LineContent, LineStyle, Panel, PlotLine, Scale};
-use crate::report::charts::figures::FigureSpec;
-use crate::report::text::words::light;
-use crate::types::degradations::{Axis, Kind};
-use crate::types::{AxisLevel, EnhancerName, Variant};
+use crate::charts::figures::FigureSpec;
+use crate::text::words::light;
+use darkqa_base::types::degradations::{Axis, Kind};
+use darkqa_base::types::{AxisLevel, EnhancerName, Variant};
 use darkqa_score::calibration::Calibration;
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::ComparisonKind;
@@ -25,7 +25,7 @@ use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::photographs::{ConditionFidelity, PairDarkness};
 
 /// The figures that have data.
-pub(crate) fn figure_specs(findings: &Findings<'_>) -> impl Iterator<Item = FigureSpec> {
+pub fn figure_specs(findings: &Findings<'_>) -> impl Iterator<Item = FigureSpec> {
     let specs = [fidelity_spec(findings), real_spec(findings), reliability_spec(findings), variation_spec(findings)];
     specs.into_iter().flatten()
 }

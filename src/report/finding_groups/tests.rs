@@ -1,5 +1,5 @@
 use super::*;
-use crate::report::sentences::{EffectDirection, SentenceScope};
+use crate::sentences::{EffectDirection, SentenceScope};
 
 fn sentence(kind: &'static str, tone: EffectDirection, text: &str, scope: SentenceScope) -> Sentence {
     Sentence {

@@ -8,13 +8,15 @@ use serde_json::{Value, json};
 use super::cost::{PricedRun, TrialCost};
 use super::join::{Joined, JoinedRun, join};
 use super::listing::listing;
-use crate::ask::prompts::Prompts;
-use crate::error::{Error, Result};
-use crate::report::page::{self, PageInputs, RunPrompts};
-use crate::runs::stored::StoredRun;
-use crate::runs::{EXPOSURE_VALUE, LUX_AT_L0, PROMPTS};
-use crate::types::manifests::RunManifest;
-use crate::types::{ChoiceDetail, QuestionId, RunQuestion, SetLight, TextPlace, TrialRef, Trials, Truths, shell_word};
+use crate::page::{self, PageInputs, RunPrompts};
+use darkqa_ask::prompts::Prompts;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_base::types::{
+    ChoiceDetail, QuestionId, RunQuestion, SetLight, TextPlace, TrialRef, Trials, Truths, shell_word,
+};
+use darkqa_runs::stored::StoredRun;
+use darkqa_runs::{EXPOSURE_VALUE, LUX_AT_L0, PROMPTS};
 use darkqa_score::accuracies::OfferedChoices;
 use darkqa_score::cluster::{ClusterUnit, Clusters, FrameTies};
 use darkqa_score::findings::Findings;

@@ -19,27 +19,27 @@ use super::join::TrialPlaces;
 use super::listing::{ReportFolder, write_in_place};
 use super::open;
 use super::written::{Scored, no_records, write_report};
-use crate::error::{Error, Result};
-use crate::files;
-use crate::report::charts::figures::{self, StoryCurves};
-use crate::report::content::Report;
-use crate::report::json::SummaryRuns;
-use crate::report::outputs::{PAGE, files as report_files, printed, write_first_failures};
-use crate::report::page::PageInputs;
-use crate::report::text::alert::Alert;
-use crate::runs::sharded_run::{open_any_run, open_choice_run};
-use crate::runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, run_name, unpack_command};
-use crate::runs::{LUX_AT_L0, Outcome, PrintArgs, StatedArgs, StdoutFormat, Syntax, record_table};
-use crate::store::{AddressChange, Store, now};
-use crate::types::manifests::{Counts, RunManifest, Status};
-use crate::types::{ChoiceDetail, Decides, ItemKey, ModelColumn, OpenDetail, QuestionId, TrialRef, Truths};
+use crate::charts::figures::{self, StoryCurves};
+use crate::content::Report;
+use crate::json::SummaryRuns;
+use crate::outputs::{PAGE, files as report_files, printed, write_first_failures};
+use crate::page::PageInputs;
+use crate::text::alert::Alert;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::manifests::{Counts, RunManifest, Status};
+use darkqa_base::types::{ChoiceDetail, Decides, ItemKey, ModelColumn, OpenDetail, QuestionId, TrialRef, Truths};
+use darkqa_runs::sharded_run::{open_any_run, open_choice_run};
+use darkqa_runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, run_name, unpack_command};
+use darkqa_runs::{LUX_AT_L0, Outcome, PrintArgs, StatedArgs, StdoutFormat, Syntax, record_table};
 use darkqa_score::accuracies::shared_items;
 use darkqa_score::answers::record::{self, Detail as _};
+use darkqa_store::{AddressChange, Store, now};
 
 /// The flags of `report`.
 #[derive(Debug, Args)]
 #[group(arg = "runs")]
-pub(crate) struct ReportArgs {
+pub struct ReportArgs {
     /// Run folders, ZIP files of bundles, or all shards of a run; several runs are compared
     #[arg(value_name = "RUN", required = true, add = Decides::Nothing)]
     pub runs: Vec<PathBuf>,
@@ -72,7 +72,7 @@ pub(crate) struct ReportArgs {
 
 /// The flags that determine how a report of stored runs is printed.
 #[derive(Debug, Args)]
-pub(crate) struct ReportShowArgs {
+pub struct ReportShowArgs {
     /// The formats that every report has.
     #[command(flatten)]
     pub show: PrintArgs,
@@ -83,7 +83,7 @@ pub(crate) struct ReportShowArgs {
 
 /// The flags of a comparison with an old run.
 #[derive(Debug, Args)]
-pub(crate) struct BaselineArgs {
+pub struct BaselineArgs {
     /// Compare each model and condition with the same ones of an old run: new less old, on the items and images that
     /// both have; default: no comparison
     #[arg(long, value_name = "OLD", add = Decides::Nothing)]
@@ -102,7 +102,7 @@ impl ReportArgs {
     }
 
     /// True if the report is written into the folder of its only run.
-    pub(crate) fn writes_into_run(&self) -> bool {
+    pub fn writes_into_run(&self) -> bool {
         let is_of_single_run = self.runs.len() == 1 && self.baseline.baseline.is_none();
         is_of_single_run && self.out.is_none() && !self.common
     }
@@ -123,7 +123,7 @@ impl ReportArgs {
 ///
 /// # Errors
 /// If a folder holds no run, a record is broken, or the runs asked different questions.
-pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
+pub fn report(args: &ReportArgs) -> Result<Outcome> {
     if args.baseline.fail_if_worse && args.baseline.baseline.is_none() {
         let problem = "compares with an old run: name it with --baseline OLD";
         return Err(Error::usage(FAIL_IF_WORSE, problem));
@@ -418,6 +418,6 @@ fn keep_common_items(mut combined: CombinedRuns) -> Result<CombinedRuns> {
 ///
 /// # Errors
 /// If a record of the run has no true choice.
-pub(crate) fn story_curves(run: StoredRun<ChoiceDetail>) -> Result<Option<StoryCurves>> {
+pub fn story_curves(run: StoredRun<ChoiceDetail>) -> Result<Option<StoryCurves>> {
     Ok(figures::story_curves(combine(vec![run])?.findings().shown()))
 }

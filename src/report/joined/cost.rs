@@ -4,12 +4,12 @@ use std::collections::HashMap;
 
 use serde_json::Value;
 
-use crate::ask::{Price, Prices, stated_charge};
-use crate::error::Result;
-use crate::types::manifests::RunManifest;
-use crate::types::text;
-use crate::types::text::money;
-use crate::types::{TrialRef, Usage, Via};
+use darkqa_ask::{Price, Prices, stated_charge};
+use darkqa_base::error::Result;
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_base::types::text;
+use darkqa_base::types::text::money;
+use darkqa_base::types::{TrialRef, Usage, Via};
 use darkqa_score::answers::record::Detail;
 
 /// A run with the prices stored in its manifest.
@@ -122,7 +122,7 @@ impl TrialCost {
 
 /// The price of a model of a run: from the run's models file, else from the price table by the name that the endpoint
 /// knows.
-pub(crate) fn price(prices: &Prices, manifest: &RunManifest, model: &str) -> Option<Price> {
+pub fn price(prices: &Prices, manifest: &RunManifest, model: &str) -> Option<Price> {
     stated_price(manifest, model).or_else(|| {
         let columns = manifest.columns.get("model").and_then(|models| models.get(model));
         let id = columns.and_then(|content| content.get("--model")?.as_str());

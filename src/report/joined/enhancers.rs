@@ -7,16 +7,16 @@ use std::collections::BTreeSet;
 use serde_json::Value;
 
 use super::join::JoinedRun;
-use crate::error::Result;
-use crate::report::tables::EnhancerRow;
-use crate::report::text::alert::{Alert, AlertKind};
-use crate::runs::LLIE_BUDGET;
-use crate::types::flags::setting_spelling;
-use crate::types::manifests::{
+use crate::tables::EnhancerRow;
+use crate::text::alert::{Alert, AlertKind};
+use darkqa_base::error::Result;
+use darkqa_base::types::flags::setting_spelling;
+use darkqa_base::types::manifests::{
     ELSEWHERE, EnhancerNote, FIRST_REPLY_READING, JudgedImages, ProbeOutcome, RunManifest, TRAINED_ON,
 };
-use crate::types::text::counted;
-use crate::types::{ChoiceDetail, Record};
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{ChoiceDetail, Record};
+use darkqa_runs::LLIE_BUDGET;
 use darkqa_score::answers::record::reread;
 use darkqa_score::choice::LENIENT_VERSION;
 

@@ -6,14 +6,14 @@ use super::alerts::alerts;
 use super::combine::{CombinedRuns, combine};
 use super::command::distinct;
 use super::written::without_hidden_models;
-use crate::error::{Error, Result};
-use crate::report::text::alert::Alert;
-use crate::runs::sharded_run::open_choice_run;
-use crate::types::{Thumbnail, Truths};
+use crate::text::alert::Alert;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::{Thumbnail, Truths};
+use darkqa_runs::sharded_run::open_choice_run;
 use darkqa_score::findings::Findings;
 
 /// Runs of questions with choices, joined as `report` joins them.
-pub(crate) struct FigureRuns {
+pub struct FigureRuns {
     combined: CombinedRuns,
     duplicate_alerts: Vec<Alert>,
 }
@@ -23,7 +23,7 @@ impl FigureRuns {
     ///
     /// # Errors
     /// If a folder has no such run or no records, the runs asked different questions, or the true answers are unknown.
-    pub(crate) fn open(folders: &[PathBuf]) -> Result<Self> {
+    pub fn open(folders: &[PathBuf]) -> Result<Self> {
         let (folders, duplicate_alerts) = distinct(folders);
         let runs = folders
             .into_iter()
@@ -42,19 +42,19 @@ impl FigureRuns {
     }
 
     /// All results of the runs, computed from their records.
-    pub(crate) fn findings(&self) -> Findings<'_> {
+    pub fn findings(&self) -> Findings<'_> {
         self.combined.findings()
     }
 
     /// All alerts about the runs.
-    pub(crate) fn alerts(&self, findings: &Findings<'_>) -> Vec<Alert> {
+    pub fn alerts(&self, findings: &Findings<'_>) -> Vec<Alert> {
         let mut all = self.duplicate_alerts.clone();
         all.extend(alerts(&self.combined, findings));
         all
     }
 
     /// The thumbnails that the runs stored.
-    pub(crate) fn thumbnails(&self) -> &[Thumbnail] {
+    pub fn thumbnails(&self) -> &[Thumbnail] {
         &self.combined.thumbnails
     }
 }

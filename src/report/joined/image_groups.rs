@@ -3,10 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::settings::{self, differing_settings, identity_fields};
-use crate::runs::stored::StoredRun;
-use crate::types::degradations::Kind;
-use crate::types::manifests::RunManifest;
-use crate::types::{Condition, Digest, EnhancerName, RunGroup, TrialRef, Variant};
+use darkqa_base::types::degradations::Kind;
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_base::types::{Condition, Digest, EnhancerName, RunGroup, TrialRef, Variant};
+use darkqa_runs::stored::StoredRun;
 use darkqa_score::answers::record::Detail;
 use darkqa_score::model_in_condition::is_control;
 

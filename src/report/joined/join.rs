@@ -6,12 +6,12 @@ use std::path::PathBuf;
 use super::cost::cost_text;
 use super::image_groups::ImageGroups;
 use super::model_names::ModelNames;
-use crate::error::Result;
-use crate::runs::stored::{RunLayout, RunTexts, StoredRun};
-use crate::types::manifests::RunManifest;
-use crate::types::{
+use darkqa_base::error::Result;
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_base::types::{
     Condition, FrameId, ImageFidelity, ModelListing, QuestionId, RunQuestion, Thumbnail, TrialKey, TrialRef, Trials,
 };
+use darkqa_runs::stored::{RunLayout, RunTexts, StoredRun};
 use darkqa_score::answers::record::Detail;
 
 /// Joined runs, with all their trials, questions and thumbnails.
@@ -19,7 +19,7 @@ pub(super) struct Joined<D: Detail> {
     /// The runs in the order in which they were given.
     pub(super) runs: Vec<JoinedRun>,
     pub(super) trials: Trials<D>,
-    /// The texts of the replies, by the file number in [`TextPlace::log`](crate::types::TextPlace).
+    /// The texts of the replies, by the file number in [`TextPlace::log`](darkqa_base::types::TextPlace).
     pub(super) texts: Vec<RunTexts<D>>,
     pub(super) questions: Vec<RunQuestion>,
     pub(super) thumbnails: Vec<Thumbnail>,

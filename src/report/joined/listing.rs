@@ -9,15 +9,15 @@ use serde_json::Value;
 
 use super::join::{Joined, JoinedRun};
 use super::settings::has_human_answers;
-use crate::error::{Error, Result};
-use crate::files;
-use crate::runs::renamed::ADAPTED_FOR;
-use crate::runs::stored::RunLayout;
-use crate::runs::training::training_data;
-use crate::store::{AddressChange, Store};
-use crate::types::manifests::RunManifest;
-use crate::types::{ModelColumn, ModelListing};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_base::types::{ModelColumn, ModelListing};
+use darkqa_runs::renamed::ADAPTED_FOR;
+use darkqa_runs::stored::RunLayout;
+use darkqa_runs::training::training_data;
 use darkqa_score::answers::record::Detail;
+use darkqa_store::{AddressChange, Store};
 
 /// The models with their order and groups from the models files of all runs, in the order of the runs' names, and facts
 /// about each model.

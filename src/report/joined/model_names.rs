@@ -4,9 +4,9 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::settings::{FlagValues, Setting, differing_settings, is_digest, model_settings};
-use crate::runs::stored::StoredRun;
-use crate::types::flags::setting_spelling;
-use crate::types::{Condition, ItemKey, QuestionId, RunQuestion, TrialKey, TrialRef, View};
+use darkqa_base::types::flags::setting_spelling;
+use darkqa_base::types::{Condition, ItemKey, QuestionId, RunQuestion, TrialKey, TrialRef, View};
+use darkqa_runs::stored::StoredRun;
 use darkqa_score::answers::record::Detail;
 
 /// Maximum number of settings in the name of a model; if more settings differ, the name of the run is used.

@@ -13,26 +13,26 @@ use super::enhancers;
 use super::join::join;
 use super::listing::listing;
 use super::settings::{FlagValues, differing_settings, reply_settings};
-use crate::error::{Error, Result};
-use crate::report::content::Report;
-use crate::report::openeqa::{MarkedAnswers, ReportedAnswer};
-use crate::report::page::{PageInputs, PageRun};
-use crate::report::tables::EnhancerRow;
-use crate::report::text::alert::{Alert, AlertKind};
-use crate::report::text::words;
-use crate::runs::mark_index::{JUDGE, MarkIndex, PROTOCOL};
-use crate::runs::predictions::{AnswerState, QuestionAnswer, predictions};
-use crate::runs::stored::{RunLayout, StoredRun, sort_trials, text_setting};
-use crate::types::flags::read_word;
-use crate::types::manifests::{JUDGES, RunManifest, judge_flag};
-use crate::types::{ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef};
+use crate::content::Report;
+use crate::openeqa::{MarkedAnswers, ReportedAnswer};
+use crate::page::{PageInputs, PageRun};
+use crate::tables::EnhancerRow;
+use crate::text::alert::{Alert, AlertKind};
+use crate::text::words;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::flags::read_word;
+use darkqa_base::types::manifests::{JUDGES, RunManifest, judge_flag};
+use darkqa_base::types::{ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef};
+use darkqa_runs::mark_index::{JUDGE, MarkIndex, PROTOCOL};
+use darkqa_runs::predictions::{AnswerState, QuestionAnswer, predictions};
+use darkqa_runs::stored::{RunLayout, StoredRun, sort_trials, text_setting};
 use darkqa_score::choice::llm_match::{Protocol, mark};
 use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::open::{AnswerOutcome, Group, OpenSummary, QuestionGroups, ScoredAnswer, open_summary_listed};
 
 /// Scored answers of a run, or of several joined into one.
-pub(crate) struct Scores {
-    pub(crate) run: OpenQuestionRun,
+pub struct Scores {
+    pub run: OpenQuestionRun,
     judge: Option<String>,
     protocol: Protocol,
     summary: OpenSummary,
@@ -120,16 +120,16 @@ impl Scores {
 }
 
 /// A run of open questions, or several joined into one, with complete records.
-pub(crate) struct OpenQuestionRun {
+pub struct OpenQuestionRun {
     /// Name of the run; the first one's if several are joined.
     name: String,
-    pub(crate) folder: PathBuf,
-    pub(crate) layout: RunLayout,
-    pub(crate) manifest: RunManifest,
+    pub folder: PathBuf,
+    pub layout: RunLayout,
+    pub manifest: RunManifest,
     /// Ordered by question, condition and model.
-    pub(crate) records: Vec<Record<OpenDetail>>,
-    pub(crate) questions: Vec<RunQuestion>,
-    pub(crate) thumbnails: Vec<Thumbnail>,
+    pub records: Vec<Record<OpenDetail>>,
+    pub questions: Vec<RunQuestion>,
+    pub thumbnails: Vec<Thumbnail>,
     /// Joined runs after the first.
     others: Vec<OtherRun>,
 }

@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 
-use crate::types::degradations::Kind;
-use crate::types::flags::setting_spelling;
-use crate::types::manifests::{JUDGES, RunManifest};
+use darkqa_base::types::degradations::Kind;
+use darkqa_base::types::flags::setting_spelling;
+use darkqa_base::types::manifests::{JUDGES, RunManifest};
 
 /// Values of settings as text, by flag.
 pub(super) type FlagValues = BTreeMap<String, String>;
@@ -113,7 +113,7 @@ pub(super) fn identity_settings(run: &RunManifest) -> FlagValues {
 }
 
 /// True if the records of a run are human answers about the images of another run.
-pub(crate) fn has_human_answers(run: &RunManifest) -> bool {
+pub(super) fn has_human_answers(run: &RunManifest) -> bool {
     run.identity.contains_key(ASKED_ABOUT)
 }
 

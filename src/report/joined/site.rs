@@ -17,17 +17,17 @@ use super::settings::{
     profile_and_variant_settings, shorten,
 };
 use super::written::{Scored, without_hidden_models};
-use crate::error::Result;
-use crate::report::outputs::html_page;
-use crate::report::site::{
+use crate::outputs::html_page;
+use crate::site::{
     GroupDifference, GroupDigests, GroupRows, LeaderboardSite, ModelRunRow, OpenRow, Ranking, RunLink, SiteGroup,
     choice_rows, open_rows,
 };
-use crate::runs::mark_index::{JUDGE, PROTOCOL};
-use crate::runs::stored::{AnyRun, StoredRun, text_setting};
-use crate::types::manifests::RunManifest;
-use crate::types::text::{counted, plural};
-use crate::types::{AxisLevel, ChoiceDetail, Digest, ModelListing, OpenDetail, RunQuestion, Trials, Variant};
+use darkqa_base::error::Result;
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_base::types::text::{counted, plural};
+use darkqa_base::types::{AxisLevel, ChoiceDetail, Digest, ModelListing, OpenDetail, RunQuestion, Trials, Variant};
+use darkqa_runs::mark_index::{JUDGE, PROTOCOL};
+use darkqa_runs::stored::{AnyRun, StoredRun, text_setting};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::{BestInTheDark, best_in_the_dark, rank_ranges};
 use darkqa_score::grid::Grid;
@@ -42,7 +42,7 @@ struct OpenMember {
 ///
 /// # Errors
 /// If a run has no records or a record is broken.
-pub(crate) fn site(runs: Vec<AnyRun>) -> Result<LeaderboardSite> {
+pub fn site(runs: Vec<AnyRun>) -> Result<LeaderboardSite> {
     let mut site = LeaderboardSite { groups: Vec::new(), others: Vec::new(), pages: Vec::new() };
     let (mut choices, mut open) = (Vec::new(), Vec::new());
     let mut pages = BTreeSet::new();

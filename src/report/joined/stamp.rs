@@ -5,17 +5,17 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, Result};
-use crate::files;
-use crate::report::text::terminal::terminal_columns;
-use crate::runs::outcome::{Outcome, StdoutFormat};
-use crate::store::{IndexedStart, NOTE_FILES, Store, program_build};
-use crate::types::Digest;
-use crate::types::manifests::RunManifest;
+use crate::text::terminal::terminal_columns;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::Digest;
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_runs::outcome::{Outcome, StdoutFormat};
 use darkqa_score::answers::record::Detail;
+use darkqa_store::{IndexedStart, NOTE_FILES, Store, program_build};
 
 /// The file of the stamp.
-pub(crate) const STAMP: &str = "report.stamp";
+pub const STAMP: &str = "report.stamp";
 
 /// What a report was made from, and what was made.
 #[derive(Debug, Serialize, Deserialize)]
@@ -63,11 +63,7 @@ pub(super) fn write<D: Detail>(
 ///
 /// # Errors
 /// If a file of the run cannot be read.
-pub(crate) fn unchanged<D: Detail>(
-    store: &Store<D>,
-    manifest: &RunManifest,
-    show: StdoutFormat,
-) -> Result<Option<Outcome>> {
+pub fn unchanged<D: Detail>(store: &Store<D>, manifest: &RunManifest, show: StdoutFormat) -> Result<Option<Outcome>> {
     let folder = store.folder();
     let log = store.indexed().and_then(|indexed| indexed.digest_of_whole(folder));
     let stamp = files::read(&folder.join(STAMP)).ok().and_then(|text| serde_json::from_slice::<Stamp>(&text).ok());

@@ -7,22 +7,22 @@ use super::alerts::{alerts, alerts_without_truths};
 use super::combine::{CombinedRuns, combine, frame_ties};
 use super::listing::ReportFolder;
 use super::{enhancers, open, stamp};
-use crate::error::{Error, Result};
-use crate::report::content::Report;
-use crate::report::json::SummaryRuns;
-use crate::report::markdown::markdown;
-use crate::report::outputs::{PAGE, files, first_failures, printed, write_first_failures};
-use crate::report::page::PageInputs;
-use crate::report::tables::help_for_time;
-use crate::report::text::alert::Alert;
-use crate::runs::outcome::{Outcome, ReportLength, StdoutFormat};
-use crate::runs::stored::{AnyRun, ShownModels, StoredRun};
-use crate::store::Store;
-use crate::types::manifests::{RunManifest, Status};
-use crate::types::{ChoiceDetail, OpenDetail, Truths};
+use crate::content::Report;
+use crate::json::SummaryRuns;
+use crate::markdown::markdown;
+use crate::outputs::{PAGE, files, first_failures, printed, write_first_failures};
+use crate::page::PageInputs;
+use crate::tables::help_for_time;
+use crate::text::alert::Alert;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::{RunManifest, Status};
+use darkqa_base::types::{ChoiceDetail, OpenDetail, Truths};
+use darkqa_runs::outcome::{Outcome, ReportLength, StdoutFormat};
+use darkqa_runs::stored::{AnyRun, ShownModels, StoredRun};
 use darkqa_score::answers::record::Detail;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::findings::Findings;
+use darkqa_store::Store;
 
 /// The results of joined runs of questions with choices, by the measure that their questions allow.
 pub(super) enum Scored<'a> {
@@ -62,11 +62,11 @@ impl<'a> Scored<'a> {
 }
 
 /// The report on one run.
-pub(crate) struct WholeReport {
+pub struct WholeReport {
     /// Names and contents of the files that `report` writes into the folder of the run.
-    pub(crate) files: Vec<(String, Vec<u8>)>,
+    pub files: Vec<(String, Vec<u8>)>,
     /// The findings and the table by level, as Markdown.
-    pub(crate) markdown: String,
+    pub markdown: String,
 }
 
 impl WholeReport {
@@ -81,7 +81,7 @@ impl WholeReport {
 ///
 /// # Errors
 /// If the run has no record, or a record is broken.
-pub(crate) fn whole_report(run: AnyRun) -> Result<WholeReport> {
+pub fn whole_report(run: AnyRun) -> Result<WholeReport> {
     match run {
         AnyRun::Choice(run) => {
             let combined = combine(vec![without_hidden_models(run)?])?;
@@ -101,7 +101,7 @@ pub(crate) fn whole_report(run: AnyRun) -> Result<WholeReport> {
 ///
 /// # Errors
 /// If a record is broken, or a file cannot be written.
-pub(crate) fn write(store: &Store, mut run: StoredRun<ChoiceDetail>, show: StdoutFormat) -> Result<Outcome> {
+pub fn write(store: &Store, mut run: StoredRun<ChoiceDetail>, show: StdoutFormat) -> Result<Outcome> {
     let manifest = run.manifest.clone();
     run.leave_out(ShownModels::Current);
     let combined = combine(vec![run])?;
@@ -113,11 +113,7 @@ pub(crate) fn write(store: &Store, mut run: StoredRun<ChoiceDetail>, show: Stdou
 }
 
 /// Scores a run, and writes its report and manifest into its folder. The run is incomplete if a mark cannot be parsed.
-pub(crate) fn write_open(
-    store: &Store<OpenDetail>,
-    mut run: StoredRun<OpenDetail>,
-    show: StdoutFormat,
-) -> Result<Outcome> {
+pub fn write_open(store: &Store<OpenDetail>, mut run: StoredRun<OpenDetail>, show: StdoutFormat) -> Result<Outcome> {
     run.leave_out(ShownModels::Current);
     let mut scores = open::Scores::new(open::combine(vec![run])?)?;
     if scores.run.manifest.status == Status::Complete && scores.has_unmarked() {

@@ -1,15 +1,15 @@
 //! Answers to open questions with the marks of a judge: [`MarkedAnswers`].
 
-use crate::report::text::words::ProfileNames;
-use crate::types::manifests::RunManifest;
-use crate::types::{RunQuestion, Thumbnail};
+use crate::text::words::ProfileNames;
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_base::types::{RunQuestion, Thumbnail};
 use darkqa_score::choice::llm_match::Protocol;
 use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::open::{AnswerOutcome, OpenSummary};
 
 /// Answers to open questions, with their marks and scores.
 #[derive(Debug, Clone)]
-pub(crate) struct MarkedAnswers<'a> {
+pub struct MarkedAnswers<'a> {
     pub summary: &'a OpenSummary,
     /// Manifest of the run, or of the first run of several.
     pub manifest: &'a RunManifest,
@@ -31,7 +31,7 @@ pub(crate) struct MarkedAnswers<'a> {
 
 impl MarkedAnswers<'_> {
     /// Names of all runs.
-    pub(crate) fn names(&self) -> Vec<String> {
+    pub fn names(&self) -> Vec<String> {
         self.runs.iter().map(|(name, _)| (*name).to_owned()).collect()
     }
 
@@ -43,7 +43,7 @@ impl MarkedAnswers<'_> {
 
 /// Answer of a model in a condition to a question.
 #[derive(Debug, Clone)]
-pub(crate) struct ReportedAnswer {
+pub struct ReportedAnswer {
     pub subject: ModelInCondition,
     /// Index of the question in the report.
     pub question: usize,

@@ -12,35 +12,31 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::error::Result;
-use crate::report::charts::chart::{Chart, Figure, LineContent, LineStyle, Panel, PlotLine};
-use crate::report::charts::paper::figure;
-use crate::report::content::{Measure, PageParts, Report};
-use crate::report::json::{SummaryRuns, document};
-use crate::report::page::{PageHead, PageInputs};
-use crate::report::tables::{EnhancerRow, LEVELS};
-use crate::report::text::alert::{Alert, AlertKind};
-use crate::report::text::ladder::{Ladder, LadderSeries, SeriesByLevel};
-use crate::report::text::table::Table;
-use crate::report::text::terminal::render;
-use crate::report::text::words::ProfileNames;
-use crate::runs::outcome::ReportLength;
-use crate::types::AxisLevel;
-use crate::types::manifests::RunManifest;
-use crate::types::text::{counted, plural};
+use crate::charts::chart::{Chart, Figure, LineContent, LineStyle, Panel, PlotLine};
+use crate::charts::paper::figure;
+use crate::content::{Measure, PageParts, Report};
+use crate::json::{SummaryRuns, document};
+use crate::page::{PageHead, PageInputs};
+use crate::tables::{EnhancerRow, LEVELS};
+use crate::text::alert::{Alert, AlertKind};
+use crate::text::ladder::{Ladder, LadderSeries, SeriesByLevel};
+use crate::text::table::Table;
+use crate::text::terminal::render;
+use crate::text::words::ProfileNames;
+use darkqa_base::error::Result;
+use darkqa_base::types::AxisLevel;
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_base::types::text::{counted, plural};
+use darkqa_runs::outcome::ReportLength;
 use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::open::{AnswerOutcome, Group, OpenCell};
 use tables::ladder;
 
-pub(crate) use marked_answers::{MarkedAnswers, ReportedAnswer};
+pub use marked_answers::{MarkedAnswers, ReportedAnswer};
 
 impl<'a> Report<'a> {
     /// The report on answers to open questions. The alerts of the runs precede those about missing answers and marks.
-    pub(crate) fn from_marked_answers(
-        answers: MarkedAnswers<'a>,
-        alerts: &[Alert],
-        enhancer_rows: &[EnhancerRow],
-    ) -> Self {
+    pub fn from_marked_answers(answers: MarkedAnswers<'a>, alerts: &[Alert], enhancer_rows: &[EnhancerRow]) -> Self {
         let measured = format!(
             "OpenEQA by LLM-Match, marked by {}, protocol {}",
             answers.judge.unwrap_or("nobody"),

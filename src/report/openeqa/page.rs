@@ -8,16 +8,16 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::marked_answers::{MarkedAnswers, ReportedAnswer};
 use super::tables::{SECTION, ladder};
-use crate::error::Result;
-use crate::report::page::data::{
+use crate::page::data::{
     ABSENT, DistinctList, FAILED, PageData, PageItem, PageKind, PageQuestion, PageSubject, SizeLimit, UNREAD, levels,
     packed_by, shortened, sizes, thumbnails,
 };
-use crate::report::tables::Section;
-use crate::report::text::words::{self, percent, points};
-use crate::types::AxisLevel;
-use crate::types::degradations::Axis;
-use crate::types::text::counted;
+use crate::tables::Section;
+use crate::text::words::{self, percent, points};
+use darkqa_base::error::Result;
+use darkqa_base::types::AxisLevel;
+use darkqa_base::types::degradations::Axis;
+use darkqa_base::types::text::counted;
 use darkqa_score::model_in_condition::{self, ModelInCondition};
 use darkqa_score::open::{AnswerOutcome, Baseline, Group, OpenCell};
 
@@ -88,7 +88,7 @@ pub(super) fn intro(report: &MarkedAnswers<'_>) -> Vec<String> {
 
 /// One line with the number of scored answers, then one line for each other outcome that occurs.
 #[must_use]
-pub(crate) fn coverage(report: &MarkedAnswers<'_>) -> Vec<String> {
+pub(super) fn coverage(report: &MarkedAnswers<'_>) -> Vec<String> {
     let scored = total(report, OpenCell::scored);
     let planned = total(report, |cell| cell.planned);
     let unjudged = match report.judge {

@@ -10,10 +10,10 @@ use flate2::write::GzEncoder;
 use serde::Serialize;
 
 use super::prompts::PagePrompts;
-use crate::error::{Error, Result};
-use crate::report::text::words;
-use crate::types::questions::PixelBox;
-use crate::types::{Axis, AxisLevel, EnhancerName, Evidence, FrameId, ObjectCrop, Thumbnail, View};
+use crate::text::words;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::questions::PixelBox;
+use darkqa_base::types::{Axis, AxisLevel, EnhancerName, Evidence, FrameId, ObjectCrop, Thumbnail, View};
 use darkqa_score::model_in_condition;
 
 /// Result code of a reply that could not be parsed. Smaller codes are choice indices or marks of the judge
@@ -43,9 +43,9 @@ const MAX_PACKED_BYTES: usize = 10_500_000;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SizeLimit {
     /// Total size of the distinct replies, in bytes.
-    pub(crate) text: usize,
+    pub text: usize,
     /// Total size of the thumbnails and object crops, in bytes.
-    pub(crate) pictures: usize,
+    pub pictures: usize,
 }
 
 /// Kind of the report's questions.
@@ -62,77 +62,77 @@ pub(crate) enum PageKind {
 /// for each subject and a column for each item.
 #[derive(Serialize)]
 pub(crate) struct PageData<'a> {
-    pub(crate) kind: PageKind,
+    pub kind: PageKind,
     /// Name of each run.
-    pub(crate) runs: Vec<String>,
+    pub runs: Vec<String>,
     /// Folder of each run.
-    pub(crate) folders: Vec<String>,
+    pub folders: Vec<String>,
     /// Name and severity of each level.
-    pub(crate) levels: Vec<[String; 2]>,
+    pub levels: Vec<[String; 2]>,
     /// Recorded name and display name of each family.
-    pub(crate) families: Vec<[&'a str; 2]>,
-    pub(crate) frames: Vec<&'a str>,
+    pub families: Vec<[&'a str; 2]>,
+    pub frames: Vec<&'a str>,
     /// Width and height of each frame in pixels; `None` if no thumbnail records them.
-    pub(crate) sizes: Vec<Option<[u32; 2]>>,
-    pub(crate) subjects: Vec<PageSubject<'a>>,
-    pub(crate) questions: Vec<PageQuestion<'a>>,
-    pub(crate) choices: Vec<&'a [String]>,
-    pub(crate) items: Vec<PageItem>,
+    pub sizes: Vec<Option<[u32; 2]>>,
+    pub subjects: Vec<PageSubject<'a>>,
+    pub questions: Vec<PageQuestion<'a>>,
+    pub choices: Vec<&'a [String]>,
+    pub items: Vec<PageItem>,
     /// Result codes by strict parsing.
-    pub(crate) strict: Vec<Vec<u8>>,
+    pub strict: Vec<Vec<u8>>,
     /// Result codes by lenient parsing; empty for open questions.
-    pub(crate) lenient: Vec<Vec<u8>>,
+    pub lenient: Vec<Vec<u8>>,
     /// Distinct reasons for unparsed replies and failed trials.
-    pub(crate) reasons: Vec<String>,
+    pub reasons: Vec<String>,
     /// Index into `reasons` of each result.
-    pub(crate) why: Vec<Vec<usize>>,
+    pub why: Vec<Vec<usize>>,
     /// Distinct texts of replies.
-    pub(crate) texts: Vec<String>,
+    pub texts: Vec<String>,
     /// Index into `texts` of each reply.
-    pub(crate) replies: Vec<Vec<usize>>,
+    pub replies: Vec<Vec<usize>>,
     /// Index into `texts` of each judge's reply; empty without a judge.
-    pub(crate) judged: Vec<Vec<usize>>,
+    pub judged: Vec<Vec<usize>>,
     /// The requests behind the replies; omitted if no reply came from an endpoint.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) requests: Option<PageRequests>,
-    pub(crate) confusions: Vec<PageConfusion<'a>>,
+    pub requests: Option<PageRequests>,
+    pub confusions: Vec<PageConfusion<'a>>,
     /// Images by frame index and condition name.
-    pub(crate) thumbnails: BTreeMap<usize, BTreeMap<String, Picture<'a>>>,
+    pub thumbnails: BTreeMap<usize, BTreeMap<String, Picture<'a>>>,
 }
 
 /// Facts about the requests of each subject and item; 0 is not known.
 #[derive(Clone, Serialize)]
 pub(crate) struct PageRequests {
     /// Duration of the last request, in milliseconds.
-    pub(crate) latency: Vec<Vec<u64>>,
+    pub latency: Vec<Vec<u64>>,
     /// Tokens of the prompt, with the images.
-    pub(crate) prompt: Vec<Vec<u64>>,
+    pub prompt: Vec<Vec<u64>>,
     /// Tokens of the reply.
-    pub(crate) reply: Vec<Vec<u64>>,
+    pub reply: Vec<Vec<u64>>,
     /// Number of requests.
-    pub(crate) attempts: Vec<Vec<u32>>,
+    pub attempts: Vec<Vec<u32>>,
     /// Cost in nanodollars; empty if no cost is known.
-    pub(crate) cost: Vec<Vec<u64>>,
+    pub cost: Vec<Vec<u64>>,
     /// Prompts; omitted if they are not known.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) prompts: Option<PagePrompts>,
+    pub prompts: Option<PagePrompts>,
 }
 
 /// Subject of the report: a model in a condition.
 #[derive(Serialize)]
 pub(crate) struct PageSubject<'a> {
-    pub(crate) name: String,
-    pub(crate) model: &'a str,
+    pub name: String,
+    pub model: &'a str,
     /// True if the model is a reference and not under test.
-    pub(crate) reference: bool,
-    pub(crate) condition: String,
+    pub reference: bool,
+    pub condition: String,
     /// Display text of variant and enhancer; `blind` without images.
-    pub(crate) light: String,
-    pub(crate) level: Option<AxisLevel>,
-    pub(crate) variant: String,
-    pub(crate) enhancer: Option<&'a str>,
+    pub light: String,
+    pub level: Option<AxisLevel>,
+    pub variant: String,
+    pub enhancer: Option<&'a str>,
     /// Index of the subject with the same model at L0 and no enhancer; `None` if it does not exist.
-    pub(crate) clean: Option<usize>,
+    pub clean: Option<usize>,
 }
 
 impl<'a> PageSubject<'a> {
@@ -157,38 +157,38 @@ impl<'a> PageSubject<'a> {
 
 #[derive(Serialize)]
 pub(crate) struct PageQuestion<'a> {
-    pub(crate) id: &'a str,
-    pub(crate) frame: usize,
-    pub(crate) family: usize,
-    pub(crate) text: &'a str,
-    pub(crate) evidence: Option<&'a Evidence>,
+    pub id: &'a str,
+    pub frame: usize,
+    pub family: usize,
+    pub text: &'a str,
+    pub evidence: Option<&'a Evidence>,
     /// Bounding boxes of the objects in question, in pixels of the frame.
-    pub(crate) outlines: Vec<PixelBox>,
+    pub outlines: Vec<PixelBox>,
     /// Bounding box of all objects in question together.
-    pub(crate) object: Option<PixelBox>,
+    pub object: Option<PixelBox>,
     /// Reference answer to an open question.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) answer: Option<&'a str>,
+    pub answer: Option<&'a str>,
     /// Further accepted answers to an open question.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    pub(crate) also_right: &'a [String],
+    pub also_right: &'a [String],
 }
 
 #[derive(Serialize)]
 pub(crate) struct PageItem {
     /// Question id, with the item's number if it is not the question's first item, as in `id#2`.
-    pub(crate) name: String,
-    pub(crate) question: usize,
+    pub name: String,
+    pub question: usize,
     /// Index into the lists of choices.
-    pub(crate) choices: usize,
+    pub choices: usize,
     /// Index of the true choice; `None` if the truth is unknown.
-    pub(crate) truth: Option<usize>,
+    pub truth: Option<usize>,
     /// Wording, order and draw in words; empty for a run with one of each.
     #[serde(skip_serializing_if = "String::is_empty")]
-    pub(crate) combination: String,
+    pub combination: String,
     /// Draw of the noise; absent for the first.
     #[serde(skip_serializing_if = "is_first")]
-    pub(crate) draw: u16,
+    pub draw: u16,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
@@ -198,28 +198,28 @@ fn is_first(draw: &u16) -> bool {
 
 #[derive(Serialize)]
 pub(crate) struct PageConfusion<'a> {
-    pub(crate) subject: usize,
-    pub(crate) family: &'a str,
-    pub(crate) labels: &'a [String],
-    pub(crate) counts: &'a [Vec<usize>],
+    pub subject: usize,
+    pub family: &'a str,
+    pub labels: &'a [String],
+    pub counts: &'a [Vec<usize>],
 }
 
 /// Images of a frame in one condition.
 #[derive(Serialize)]
 pub(crate) struct Picture<'a> {
     /// Small copy of the whole image, as a data URL.
-    pub(crate) small: &'a str,
+    pub small: &'a str,
     /// Middle of the image, as a data URL.
-    pub(crate) crop: &'a str,
+    pub crop: &'a str,
     /// Gain applied to the crop, in EV.
-    pub(crate) stops: f32,
-    pub(crate) objects: &'a [ObjectCrop],
+    pub stops: f32,
+    pub objects: &'a [ObjectCrop],
 }
 
 /// List of distinct entries, and the index of each entry.
 pub(crate) struct DistinctList<T> {
-    pub(crate) list: Vec<T>,
-    pub(crate) indices: HashMap<T, usize>,
+    pub list: Vec<T>,
+    pub indices: HashMap<T, usize>,
 }
 
 impl<T: Copy + Eq + std::hash::Hash> DistinctList<T> {
@@ -319,10 +319,7 @@ pub(crate) fn levels(levels: impl Iterator<Item = AxisLevel>) -> Vec<[String; 2]
 }
 
 /// Selects the thumbnails of `frames` that fit into the largest size limit. Removes object crops that do not fit.
-pub(crate) fn fitting_thumbnails<'a>(
-    all: &[Thumbnail],
-    frames: impl IntoIterator<Item = &'a FrameId>,
-) -> Vec<Thumbnail> {
+pub fn fitting_thumbnails<'a>(all: &[Thumbnail], frames: impl IntoIterator<Item = &'a FrameId>) -> Vec<Thumbnail> {
     let indices: HashMap<&str, usize> =
         frames.into_iter().enumerate().map(|(index, frame)| (&*frame.0, index)).collect();
     let fitting = thumbnails(all, &indices, SIZE_LIMITS[0].pictures);

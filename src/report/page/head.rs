@@ -7,14 +7,14 @@ use std::collections::{BTreeSet, HashSet};
 use serde::Serialize;
 
 use super::run_usage::PageInputs;
-use crate::error::Result;
-use crate::report::charts::chart::{Chart, Figure};
-use crate::report::charts::figures::{DisplayNames, overview, split};
-use crate::report::charts::paper::figure;
-use crate::report::finding_groups::{Effect, FindingGroups, GroupedFinding};
-use crate::report::sentences::capitalised;
-use crate::report::text::words::light;
-use crate::types::{Axis, AxisLevel, EnhancerName, FrameId, Thumbnail, Variant};
+use crate::charts::chart::{Chart, Figure};
+use crate::charts::figures::{DisplayNames, overview, split};
+use crate::charts::paper::figure;
+use crate::finding_groups::{Effect, FindingGroups, GroupedFinding};
+use crate::sentences::capitalised;
+use crate::text::words::light;
+use darkqa_base::error::Result;
+use darkqa_base::types::{Axis, AxisLevel, EnhancerName, FrameId, Thumbnail, Variant};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::findings::Findings;
 use darkqa_score::grid::{Grid, TrialResult};
@@ -25,7 +25,7 @@ const MARK_REACH: f64 = 50.0;
 
 /// Content of the first screen.
 #[derive(Serialize)]
-pub(crate) struct PageHead {
+pub struct PageHead {
     summary: String,
     /// One chart, or none.
     figures: Vec<Figure>,
@@ -63,11 +63,7 @@ impl PageHead {
     ///
     /// # Errors
     /// If the chart cannot be drawn, or a question cannot be read.
-    pub(crate) fn new(
-        findings: &Findings<'_>,
-        groups: &FindingGroups<'_>,
-        inputs: &PageInputs<'_>,
-    ) -> Result<Option<Self>> {
+    pub fn new(findings: &Findings<'_>, groups: &FindingGroups<'_>, inputs: &PageInputs<'_>) -> Result<Option<Self>> {
         if groups.main_findings().is_empty() {
             return Ok(None);
         }
@@ -79,12 +75,12 @@ impl PageHead {
     }
 
     /// First screen with only a summary.
-    pub(crate) fn from_summary(summary: &str) -> Self {
+    pub fn from_summary(summary: &str) -> Self {
         Self { summary: with_unbroken_percent(summary), figures: Vec::new(), rows: Vec::new(), strip: None }
     }
 
     /// First screen with the summary and the main findings, without chart and images.
-    pub(crate) fn without_images(groups: &FindingGroups<'_>) -> Self {
+    pub fn without_images(groups: &FindingGroups<'_>) -> Self {
         let first = groups.main_findings();
         let reach = first
             .iter()
@@ -389,7 +385,7 @@ impl StripTrial<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::sentences::{EffectDirection, Sentence, SentenceScope};
+    use crate::sentences::{EffectDirection, Sentence, SentenceScope};
 
     #[test]
     fn a_percent_sign_stays_with_its_number() {

@@ -10,10 +10,10 @@ use super::data::{
 };
 use super::prompts::PagePrompts;
 use super::run_usage::PageInputs;
-use crate::error::Result;
-use crate::report::text::words::{self, family};
-use crate::types::questions::around;
-use crate::types::{AxisLevel, Digest, FailureKind, Family, QuestionId, RunQuestion, TrialRef, UnreadReason};
+use crate::text::words::{self, family};
+use darkqa_base::error::Result;
+use darkqa_base::types::questions::around;
+use darkqa_base::types::{AxisLevel, Digest, FailureKind, Family, QuestionId, RunQuestion, TrialRef, UnreadReason};
 use darkqa_score::answers::confusion;
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::grid::{Grid, GridItem, TrialResult};
@@ -23,7 +23,7 @@ use darkqa_score::model_in_condition::ModelInCondition;
 ///
 /// # Errors
 /// If a reply or a question cannot be read, or the data cannot be serialized.
-pub(crate) fn packed<'a>(
+pub fn packed<'a>(
     grid: &'a Grid<'a>,
     confusions: &'a [confusion::Confusion],
     inputs: &PageInputs<'a>,
@@ -323,7 +323,7 @@ pub(super) fn sample<'a>(grid: &Grid<'a>) -> Option<Grid<'a>> {
 }
 
 /// Note that the page has only a sample of the items; `None` if it has all.
-pub(crate) fn note(grid: &Grid<'_>) -> Option<String> {
+pub fn note(grid: &Grid<'_>) -> Option<String> {
     let (all, max) = (grid.items.len(), max_items(grid));
     (all > max).then(|| {
         format!(

@@ -1,4 +1,4 @@
-//! HTML page of a report: [`page`], made of the report and the parts that depend on its measure ([`PageParts`](crate::report::content::PageParts)).
+//! HTML page of a report: [`page`], made of the report and the parts that depend on its measure ([`PageParts`](crate::content::PageParts)).
 //!
 //! Numbers and figures are text and SVG, so that the page can be read and printed without scripts. The items and their
 //! thumbnails are packed data, which a script displays. The page needs no network, and its content security policy
@@ -18,28 +18,28 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::tables::{ACCURACY, ENHANCERS};
-use crate::error::Result;
-use crate::report::charts::chart::Figure;
-use crate::report::charts::samples::{SampleTable, samples_of};
-use crate::report::content::Report;
-use crate::report::finding_groups::{FindingGroup, FindingGroups};
-use crate::report::sentences::Sentence;
-use crate::report::tables::Section;
-use crate::report::template::render;
-use crate::report::text::alert::{Alert, AlertKind};
-use crate::report::text::table::{ColumnKind, Table, TableCell, TableFormat, TableRow};
-use crate::report::text::words::{ends, interval, words};
-use crate::types::Thumbnail;
-use crate::types::flags::setting_spelling;
-use crate::types::manifests::RunManifest;
+use crate::charts::chart::Figure;
+use crate::charts::samples::{SampleTable, samples_of};
+use crate::content::Report;
+use crate::finding_groups::{FindingGroup, FindingGroups};
+use crate::sentences::Sentence;
+use crate::tables::Section;
+use crate::template::render;
+use crate::text::alert::{Alert, AlertKind};
+use crate::text::table::{ColumnKind, Table, TableCell, TableFormat, TableRow};
+use crate::text::words::{ends, interval, words};
+use darkqa_base::error::Result;
+use darkqa_base::types::Thumbnail;
+use darkqa_base::types::flags::setting_spelling;
+use darkqa_base::types::manifests::RunManifest;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::significance::Verdict;
 
-pub(crate) use data::fitting_thumbnails;
-pub(crate) use head::PageHead;
-pub(crate) use items::{note as items_note, packed as packed_items};
-pub(crate) use prompts::RunPrompts;
-pub(crate) use run_usage::{PageRun, RunUsage};
+pub use data::fitting_thumbnails;
+pub use head::PageHead;
+pub use items::{note as items_note, packed as packed_items};
+pub use prompts::RunPrompts;
+pub use run_usage::{PageRun, RunUsage};
 
 pub use run_usage::PageInputs;
 
@@ -126,7 +126,7 @@ impl<'a> PageSentence<'a> {
 ///
 /// # Errors
 /// If the items cannot be serialized or the template cannot be rendered.
-pub(crate) fn page(report: &Report<'_>, figures: &[Figure], inputs: &PageInputs<'_>) -> Result<String> {
+pub fn page(report: &Report<'_>, figures: &[Figure], inputs: &PageInputs<'_>) -> Result<String> {
     let parts = report.measure.page_parts(report, inputs)?;
     let groups = FindingGroups::new(&report.sentences);
     // A property of the noise profile holds for every run with it: a line of the introduction, no warning.
@@ -295,7 +295,7 @@ const MIN_FOLDED_ROWS: usize = 3;
 
 /// Table for the template.
 #[derive(Serialize)]
-pub(crate) struct PageTable<'a> {
+pub struct PageTable<'a> {
     caption: &'a str,
     /// True if the table is closed until the reader opens it.
     folded: bool,

@@ -5,18 +5,18 @@ use std::collections::{BTreeMap, HashMap};
 
 use serde::Serialize;
 
-use crate::ask::prompts::Prompts;
-use crate::types::View;
+use darkqa_ask::prompts::Prompts;
+use darkqa_base::types::View;
 
 /// Prompts of one or more runs, with the texts around the questions.
 #[derive(Debug)]
 pub struct RunPrompts {
     /// Templates of all runs.
-    pub(crate) templates: Prompts,
+    pub templates: Prompts,
     /// True if the image precedes the text.
-    pub(crate) image_first: bool,
+    pub image_first: bool,
     /// Models at endpoints, each with its system message.
-    pub(crate) models: BTreeMap<String, Option<String>>,
+    pub models: BTreeMap<String, Option<String>>,
 }
 
 /// Prompts for the script.
@@ -24,13 +24,13 @@ pub struct RunPrompts {
 pub(crate) struct PagePrompts {
     /// Distinct prompts, the first one empty, with marks in place of the question and its choices: the characters from
     /// [`QUESTION`] and [`CHOICES`] on.
-    pub(crate) forms: Vec<String>,
+    pub forms: Vec<String>,
     /// Indices into `forms` for each item: with and without its image; 0 if the prompt is not known.
-    pub(crate) items: Vec<[usize; 2]>,
+    pub items: Vec<[usize; 2]>,
     /// True if the image precedes the text.
-    pub(crate) image_first: bool,
+    pub image_first: bool,
     /// Models at endpoints, each with its system message.
-    pub(crate) models: BTreeMap<String, Option<String>>,
+    pub models: BTreeMap<String, Option<String>>,
 }
 
 /// Mark of the question, a character of the private use area.
@@ -107,8 +107,9 @@ mod tests {
 
     fn page_prompts(choice: &str, items: &[(&str, &[&str])]) -> PagePrompts {
         let stored = serde_json::json!({"choice": choice, "blind": "{{ question }}{% for c in choices %} {{ c.text }}{% endfor %}"});
-        let digest =
-            crate::types::Digest::from_parts(["choice", "blind"].map(|name| stored[name].as_str().unwrap().as_bytes()));
+        let digest = darkqa_base::types::Digest::from_parts(
+            ["choice", "blind"].map(|name| stored[name].as_str().unwrap().as_bytes()),
+        );
         let templates = Prompts::from_stored(&digest.to_string(), Some(&stored)).unwrap();
         let prompts = RunPrompts { templates, image_first: false, models: BTreeMap::new() };
         let items: Vec<(&str, Vec<String>)> = items

@@ -5,11 +5,11 @@
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 use super::prompts::RunPrompts;
-use crate::error::Result;
-use crate::report::sentences::with_separators;
-use crate::types::manifests::RunManifest;
-use crate::types::text::counted;
-use crate::types::{ChoiceDetail, QuestionId, RunQuestion, TextPlace, Thumbnail, TrialRef, Usage};
+use crate::sentences::with_separators;
+use darkqa_base::error::Result;
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{ChoiceDetail, QuestionId, RunQuestion, TextPlace, Thumbnail, TrialRef, Usage};
 
 /// Usage of a run's trials at endpoints: requests, tokens, bytes of images, latency, and the model names that the
 /// servers returned. Built-in models need no endpoint.
@@ -32,7 +32,7 @@ pub struct RunUsage {
 
 impl RunUsage {
     /// Sums the usage of trials. `is_built_in` returns true for the name of a model that needs no endpoint.
-    pub(crate) fn new<'t>(
+    pub fn new<'t>(
         trials: impl Iterator<Item = TrialRef<'t, ChoiceDetail>>,
         is_built_in: impl Fn(&str) -> bool,
     ) -> Self {
@@ -119,7 +119,7 @@ pub struct PageRun<'a> {
 }
 
 /// Function that reads questions by id.
-pub(crate) type ReadQuestions<'a> = Box<dyn Fn(&HashSet<&QuestionId>) -> Result<HashMap<QuestionId, RunQuestion>> + 'a>;
+pub(super) type ReadQuestions<'a> = Box<dyn Fn(&HashSet<&QuestionId>) -> Result<HashMap<QuestionId, RunQuestion>> + 'a>;
 
 /// Data of the page other than the findings.
 pub struct PageInputs<'a> {

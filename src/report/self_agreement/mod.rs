@@ -12,23 +12,23 @@ use std::collections::BTreeSet;
 use serde::Serialize;
 
 use super::tables::{ENHANCERS, Section, with_training};
-use crate::error::Result;
-use crate::report::charts::chart::{Chart, Figure, LineContent, LineStyle, Panel, PlotLine, Scale};
-use crate::report::charts::paper::figure;
-use crate::report::content::{Measure, PageParts, Report};
-use crate::report::finding_groups::FindingGroups;
-use crate::report::json::{JsonRows, RunsHead, SummaryRuns, document};
-use crate::report::page::{PageHead, PageInputs, items_note, packed_items};
-use crate::report::sentences::{Sentence, self_agreement};
-use crate::report::short::who_is_judged;
-use crate::report::text::alert::Alert;
-use crate::report::text::ladder::{Ladder, LadderSeries, SeriesByLevel};
-use crate::report::text::table::Table;
-use crate::report::text::terminal::{table, wrapped};
-use crate::report::text::words::ProfileNames;
-use crate::runs::outcome::ReportLength;
-use crate::types::AxisLevel;
-use crate::types::text::{counted, plural};
+use crate::charts::chart::{Chart, Figure, LineContent, LineStyle, Panel, PlotLine, Scale};
+use crate::charts::paper::figure;
+use crate::content::{Measure, PageParts, Report};
+use crate::finding_groups::FindingGroups;
+use crate::json::{JsonRows, RunsHead, SummaryRuns, document};
+use crate::page::{PageHead, PageInputs, items_note, packed_items};
+use crate::sentences::{Sentence, self_agreement};
+use crate::short::who_is_judged;
+use crate::text::alert::Alert;
+use crate::text::ladder::{Ladder, LadderSeries, SeriesByLevel};
+use crate::text::table::Table;
+use crate::text::terminal::{table, wrapped};
+use crate::text::words::ProfileNames;
+use darkqa_base::error::Result;
+use darkqa_base::types::AxisLevel;
+use darkqa_base::types::text::{counted, plural};
+use darkqa_runs::outcome::ReportLength;
 use darkqa_score::accuracies::Health;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
@@ -37,7 +37,7 @@ use tables::{AGREEMENT, HOW_TO_READ, levels, notes};
 
 impl<'a> Report<'a> {
     /// The report on the agreement of models with their own answers at L0.
-    pub(crate) fn from_self_agreement(found: &'a SelfAgreement<'a>, alerts: Vec<Alert>) -> Self {
+    pub fn from_self_agreement(found: &'a SelfAgreement<'a>, alerts: Vec<Alert>) -> Self {
         Self {
             measure: Box::new(OwnAnswers { found }),
             facts: facts(found),

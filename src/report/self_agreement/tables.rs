@@ -6,15 +6,15 @@
 
 use std::collections::BTreeSet;
 
-use crate::report::tables::{
+use crate::tables::{
     agreement_comparisons, commonest_answers, counted_answers, health, in_lux, missing_threshold_reason,
 };
-use crate::report::text::ladder::{Ladder, SeriesByLevel};
-use crate::report::text::table::ColumnKind::{self, Accuracy, Count, Number, Percent, Ratio, Share, Text};
-use crate::report::text::table::{SUMMARY, Table, TableBuilder, TableCell, TableFormat};
-use crate::report::text::words::{light, percent, with_interval};
-use crate::types::text::counted;
-use crate::types::{Axis, AxisLevel};
+use crate::text::ladder::{Ladder, SeriesByLevel};
+use crate::text::table::ColumnKind::{self, Accuracy, Count, Number, Percent, Ratio, Share, Text};
+use crate::text::table::{SUMMARY, Table, TableBuilder, TableCell, TableFormat};
+use crate::text::words::{light, percent, with_interval};
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{Axis, AxisLevel};
 use darkqa_score::answers::confusion::{Confusion, Hallucination};
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};

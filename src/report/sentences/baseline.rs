@@ -13,7 +13,7 @@ const MAX_NAMED: usize = 3;
 
 /// The detected differences of each model from the run `old`; a single sentence if no difference is detected. `random`
 /// and the observer are left out if other models exist.
-pub(crate) fn against_baseline(rows: &[BaselineRow], old: &str, unit: ClusterUnit) -> Vec<Sentence> {
+pub fn against_baseline(rows: &[BaselineRow], old: &str, unit: ClusterUnit) -> Vec<Sentence> {
     let judged = models_under_test(rows.iter().map(|row| &*row.subject.model));
     let rows: Vec<&BaselineRow> = rows.iter().filter(|row| judged.contains(&*row.subject.model)).collect();
     let mut sentences = Vec::new();
@@ -31,7 +31,7 @@ pub(crate) fn against_baseline(rows: &[BaselineRow], old: &str, unit: ClusterUni
 }
 
 /// The reason why no verdict about these rows is possible.
-pub(crate) fn no_verdict(rows: &[&BaselineRow], unit: ClusterUnit) -> String {
+pub fn no_verdict(rows: &[&BaselineRow], unit: ClusterUnit) -> String {
     too_few(rows, &mut NamedNumbers::new(unit))
 }
 

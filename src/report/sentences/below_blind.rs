@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 
 use super::pooled::{detail, runs, unconfirmed, with_verdict};
 use super::sentence::{EffectDirection, NamedNumbers, Sentence, capitalised, format_alone, level_runs};
-use crate::report::text::words::family as family_name;
-use crate::types::{Axis, AxisLevel, Variant};
+use crate::text::words::family as family_name;
+use darkqa_base::types::{Axis, AxisLevel, Variant};
 use darkqa_score::calibration::{Calibration, MIN_CONFIDENT_REPLIES};
 use darkqa_score::cluster::{ClusterUnit, MIN_CLUSTERS};
 use darkqa_score::comparisons::{Claim, Comparison, PooledFinding, PooledKind, Tested};

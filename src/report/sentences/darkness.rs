@@ -5,9 +5,9 @@
 use super::pooled::{curve, detail, lower_or_higher, mean_levels, reservation, runs, unconfirmed, with_verdict};
 use super::sample::{Undecided, WIDE, is_impossible, silent_levels};
 use super::sentence::{EffectDirection, NamedNumbers, Sentence, capitalised, format_alone};
-use crate::report::text::words::light;
-use crate::types::degradations::{Axis, Kind};
-use crate::types::{AxisLevel, RunGroup, Variant};
+use crate::text::words::light;
+use darkqa_base::types::degradations::{Axis, Kind};
+use darkqa_base::types::{AxisLevel, RunGroup, Variant};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use super::pooled::{detail, runs, with_verdict};
 use super::sentence::{EffectDirection, NamedNumbers, Sentence};
-use crate::report::text::words::family as family_name;
-use crate::types::{AxisLevel, Family, Variant};
+use crate::text::words::family as family_name;
+use darkqa_base::types::{AxisLevel, Family, Variant};
 use darkqa_score::answers::confusion::{Collapse, FalseAnswer, MIN_EXCESS};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::PooledFinding;

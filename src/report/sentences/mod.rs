@@ -32,10 +32,10 @@ mod variation;
 use std::collections::BTreeSet;
 
 use self::hallucination::TopAnswer;
-use crate::report::text::alert::MAX_UNREAD;
-use crate::types::{Family, UnreadReason, Variant};
+use crate::text::alert::MAX_UNREAD;
 use below_blind::Confidence;
 use darkness::{findings_of_kind, in_each_light, mean_findings};
+use darkqa_base::types::{Family, UnreadReason, Variant};
 use darkqa_score::answers::confusion::FalseAnswer;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, FindingByProfile, NoiseHypothesis, PooledFinding, PooledKind, Robustness};
@@ -48,14 +48,14 @@ use sentence::NamedNumbers;
 #[cfg(test)]
 pub(crate) use sentence::SentenceScope;
 
-pub(crate) use baseline::{against_baseline, no_verdict};
-pub(crate) use models::dark_levels;
-pub(crate) use sample::left_out;
-pub(crate) use self_agreement::self_agreement;
-pub(crate) use sentence::{EffectDirection, Sentence, capitalised, level_runs, with_separators};
+pub use baseline::{against_baseline, no_verdict};
+pub use models::dark_levels;
+pub use sample::left_out;
+pub use self_agreement::self_agreement;
+pub use sentence::{EffectDirection, Sentence, capitalised, level_runs, with_separators};
 
 /// The line below the sentences that explains their signs, p-values and intervals, and what the intervals leave out.
-pub(crate) fn how_to_read(sentences: &[Sentence]) -> String {
+pub fn how_to_read(sentences: &[Sentence]) -> String {
     let has_variation = sentences.iter().any(|sentence| sentence.kind == "variation");
     let asked = if has_variation {
         "the wordings, orders and draws that were asked; the table of their variation has intervals for others, too"
@@ -73,7 +73,7 @@ pub(crate) fn how_to_read(sentences: &[Sentence]) -> String {
 
 /// All sentences, in the order of their importance.
 #[must_use]
-pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
+pub fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
     let mut sentences = Vec::new();
     sentences.extend(sample::impossible(findings));
     sentences.extend(sample::left_out(findings));

@@ -8,9 +8,9 @@ use std::collections::BTreeSet;
 use super::darkness::Topic;
 use super::sample::{listed, topic_in_light};
 use super::sentence::{EffectDirection, NamedNumbers, Sentence, capitalised, level_runs};
-use crate::report::text::words::{family, light};
-use crate::types::degradations::{Axis, Kind};
-use crate::types::{AxisLevel, Family, UnreadReason, Variant, View};
+use crate::text::words::{family, light};
+use darkqa_base::types::degradations::{Axis, Kind};
+use darkqa_base::types::{AxisLevel, Family, UnreadReason, Variant, View};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::{BestInTheDark, Claim, Crossing, LevelLead, PooledKind, pool};
 use darkqa_score::estimate::{Estimate, largest};
@@ -175,7 +175,7 @@ impl<'b> DetectedCrossing<'b> {
 }
 
 /// The dark levels over which models are compared, as `L3–L5`.
-pub(crate) fn dark_levels(best: &BestInTheDark) -> String {
+pub fn dark_levels(best: &BestInTheDark) -> String {
     level_runs(&best.levels, &best.asked)
 }
 

@@ -2,7 +2,7 @@
 
 use super::sample::Undecided;
 use super::sentence::{EffectDirection, NamedNumbers, Sentence, format_alone, level_runs, models};
-use crate::types::AxisLevel;
+use darkqa_base::types::AxisLevel;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding};
 use darkqa_score::estimate::Estimate;

@@ -3,7 +3,7 @@
 
 use super::pooled::{lower_or_higher, unconfirmed};
 use super::sentence::{EffectDirection, NamedNumbers, Sentence};
-use crate::report::text::words::light;
+use crate::text::words::light;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, Comparison, ComparisonKind};
 use darkqa_score::findings::Findings;

@@ -5,8 +5,8 @@
 use std::collections::BTreeSet;
 
 use super::sentence::{EffectDirection, NamedNumbers, Sentence, level_runs, models};
-use crate::report::text::words::light;
-use crate::types::{AxisLevel, EnhancerName, Variant, View};
+use crate::text::words::light;
+use darkqa_base::types::{AxisLevel, EnhancerName, Variant, View};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, ModelsLeftOut, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
@@ -123,7 +123,7 @@ fn half_width(finding: &PooledFinding) -> f64 {
 /// The models that are left out of findings, because they answered fewer questions than others. Findings with the same
 /// levels and models share a sentence. False answers are skipped, because they leave out the same models as the cost of
 /// darkness.
-pub(crate) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
+pub fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
     let mut grouped: Vec<(&ModelsLeftOut, Vec<String>)> = Vec::new();
     for set in &findings.left_out {
         if matches!(set.kind, PooledKind::Hallucination(_)) {

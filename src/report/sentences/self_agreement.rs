@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use super::sentence::{EffectDirection, NamedNumbers, Sentence, level_runs};
 use super::threshold::evidence_down_to;
-use crate::report::text::words::light;
-use crate::types::{AxisLevel, EnhancerName, SetLight, Variant};
+use crate::text::words::light;
+use darkqa_base::types::{AxisLevel, EnhancerName, SetLight, Variant};
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
 use darkqa_score::comparisons::self_agreement::light::LightReplies;
@@ -15,7 +15,7 @@ use darkqa_score::significance::Verdict;
 
 /// All sentences of a run without true answers: models against each other at L0 first, then each model.
 #[must_use]
-pub(crate) fn self_agreement(found: &SelfAgreement<'_>) -> Vec<Sentence> {
+pub fn self_agreement(found: &SelfAgreement<'_>) -> Vec<Sentence> {
     let mut sentences = between(found);
     for model in found.models() {
         let light = found.light_of(model);

@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::report::text::words::{light, p, points, share_decimals};
-use crate::types::text::counted;
-use crate::types::{EnhancerName, ModelListing};
+use crate::text::words::{light, p, points, share_decimals};
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{EnhancerName, ModelListing};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding, PooledKind};
 use darkqa_score::estimate::Estimate;
@@ -16,7 +16,7 @@ use darkqa_score::significance::{SwapMethod, Verdict};
 
 /// A finding in words.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Sentence {
+pub struct Sentence {
     /// The kind of finding.
     pub kind: &'static str,
     /// The direction of the effect.
@@ -45,7 +45,7 @@ impl Sentence {
     }
 
     /// The text without the sentence about training data and without full stop.
-    pub(crate) fn claim(&self) -> &str {
+    pub fn claim(&self) -> &str {
         let text = self.text.strip_suffix(&self.scope.training);
         text.unwrap_or(&self.text).trim_end_matches(['.', ' '])
     }
@@ -53,7 +53,7 @@ impl Sentence {
 
 /// The part of a run that a sentence is about.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(crate) struct SentenceScope {
+pub struct SentenceScope {
     /// The light, if there are several sentences with the same content about different lights.
     pub light: Option<String>,
     /// The enhancer that the sentence is about.
@@ -66,7 +66,7 @@ pub(crate) struct SentenceScope {
 
 /// The direction of a sentence's effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub(crate) enum EffectDirection {
+pub enum EffectDirection {
     /// An improvement is detected.
     #[serde(rename = "better")]
     Better,
@@ -84,7 +84,7 @@ pub(crate) enum EffectDirection {
 impl EffectDirection {
     /// The sign before the sentence.
     #[must_use]
-    pub(crate) fn sign(self) -> char {
+    pub fn sign(self) -> char {
         match self {
             Self::Better => '+',
             Self::Worse => '−',
@@ -93,12 +93,12 @@ impl EffectDirection {
     }
 
     /// True if a gain or a loss is detected.
-    pub(crate) fn is_detected(self) -> bool {
+    pub fn is_detected(self) -> bool {
         matches!(self, Self::Better | Self::Worse)
     }
 
     /// The CSS class.
-    pub(crate) fn class(self) -> &'static str {
+    pub fn class(self) -> &'static str {
         match self {
             Self::Better => "better",
             Self::Worse => "worse",
@@ -247,7 +247,7 @@ impl NamedNumbers {
 }
 
 /// A whole number with thousands separators, as `26,781`.
-pub(crate) fn with_separators(number: u64) -> String {
+pub fn with_separators(number: u64) -> String {
     let digits = number.to_string();
     let mut text = String::new();
     for (place, digit) in digits.chars().enumerate() {
@@ -268,13 +268,13 @@ pub(super) fn models(names: &[String], numbers: &mut NamedNumbers) -> String {
 }
 
 /// A text with its first letter in upper case.
-pub(crate) fn capitalised(text: &str) -> String {
+pub fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().into_iter().flat_map(char::to_uppercase).chain(letters).collect()
 }
 
 /// Levels in words; levels that are neighbours in `all` become a range, as `L1–L3, L5`.
-pub(crate) fn level_runs<T: PartialEq + ToString>(levels: &[T], all: &[T]) -> String {
+pub fn level_runs<T: PartialEq + ToString>(levels: &[T], all: &[T]) -> String {
     let runs: Vec<String> = levels
         .chunk_by(|a, b| {
             let [a, b] = [a, b].map(|level| all.iter().position(|other| other == level));

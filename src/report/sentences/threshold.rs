@@ -4,9 +4,9 @@
 use std::fmt::Write as _;
 
 use super::sentence::{EffectDirection, NamedNumbers, Sentence};
-use crate::report::text::words::{light, lux, stops};
-use crate::types::degradations::{Axis, Kind};
-use crate::types::{AxisLevel, EnhancerName, Variant};
+use crate::text::words::{light, lux, stops};
+use darkqa_base::types::degradations::{Axis, Kind};
+use darkqa_base::types::{AxisLevel, EnhancerName, Variant};
 use darkqa_score::accuracies::{Curve, FloorKind};
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::findings::Findings;

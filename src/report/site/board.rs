@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use crate::report::text::table::{ColumnKind, TableCell};
-use crate::report::text::terminal::readable;
-use crate::report::text::words::{ends, interval, words};
+use crate::text::table::{ColumnKind, TableCell};
+use crate::text::terminal::readable;
+use crate::text::words::{ends, interval, words};
 
 /// Table for the template.
 #[derive(Serialize)]

@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::board::{BoardCell, BoardRow, BoardTable};
 use super::open::{GroupDigests, RunLink};
-use crate::report::tables::missing_threshold_reason;
-use crate::report::text::table::ColumnKind::{self, Count, Points, Share, Text, Threshold};
-use crate::report::text::table::{Table, TableBuilder, TableCell};
-use crate::report::text::words::{light, points};
-use crate::types::{AxisLevel, Variant, View};
+use crate::tables::missing_threshold_reason;
+use crate::text::table::ColumnKind::{self, Count, Points, Share, Text, Threshold};
+use crate::text::table::{Table, TableBuilder, TableCell};
+use crate::text::words::{light, points};
+use darkqa_base::types::{AxisLevel, Variant, View};
 use darkqa_score::accuracies::Curve;
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::{Comparison, ComparisonKind, RankRange};
@@ -20,11 +20,11 @@ use darkqa_score::threshold::{NoThreshold, Threshold as EvThreshold};
 
 /// Results of one model in one run.
 #[derive(Debug, Clone)]
-pub(crate) struct ModelRunRow {
-    pub(crate) model: String,
-    pub(crate) run: RunLink,
+pub struct ModelRunRow {
+    pub model: String,
+    pub run: RunLink,
     /// Rank among the models of its table; `None` if it is not ranked.
-    pub(crate) rank: Option<RankRange>,
+    pub rank: Option<RankRange>,
     /// Accuracy at L0; `None` without a reply.
     clean: Option<Estimate>,
     /// The variant of the degraded levels, as the page of the run names it.
@@ -48,12 +48,12 @@ pub(crate) struct ModelRunRow {
 
 impl ModelRunRow {
     /// True for a reference model, which is listed for comparison and has no rank.
-    pub(crate) fn is_reference(&self) -> bool {
+    pub fn is_reference(&self) -> bool {
         is_reference(&self.model)
     }
 
     /// Key of the initial order: by rank, then by area; rows without a rank come last.
-    pub(crate) fn sort_key(&self) -> (usize, usize, bool, i64) {
+    pub fn sort_key(&self) -> (usize, usize, bool, i64) {
         let rank = self.rank.unwrap_or(RankRange { first: usize::MAX, last: usize::MAX });
         let area = self.area.map_or(0.0, |area| area.value);
         (rank.first, rank.last, self.is_reference(), -(area * 1e9) as i64)
@@ -73,7 +73,7 @@ impl ModelRunRow {
 }
 
 /// Rows of a run's models with images, in the main variant of its report. All numbers are the same as in the report.
-pub(crate) fn choice_rows(findings: &Findings<'_>, variant: &Variant, run: &RunLink) -> Vec<ModelRunRow> {
+pub fn choice_rows(findings: &Findings<'_>, variant: &Variant, run: &RunLink) -> Vec<ModelRunRow> {
     let mut models: Vec<&str> = Vec::new();
     for subject in &findings.grid.subjects {
         if subject.view == Some(View::Image) && !models.contains(&&*subject.model) {

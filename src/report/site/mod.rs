@@ -11,19 +11,19 @@ use serde::Serialize;
 
 use super::page::STYLE;
 use super::template::render;
-use crate::error::{Error, Result};
-use crate::report::json::JsonRows;
-use crate::report::text::table::{self, Table};
-use crate::report::text::terminal::readable;
-use crate::types::text::counted;
+use crate::json::JsonRows;
+use crate::text::table::{self, Table};
+use crate::text::terminal::readable;
 use board::BoardTable;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::text::counted;
 
-pub(crate) use choices::{ModelRunRow, choice_rows};
-pub(crate) use content::{DATA, GroupDifference, GroupRows, LeaderboardSite, Ranking, SiteGroup};
-pub(crate) use open::{GroupDigests, OpenRow, PAGES, RunLink, open_rows};
+pub use choices::{ModelRunRow, choice_rows};
+pub use content::{DATA, GroupDifference, GroupRows, LeaderboardSite, Ranking, SiteGroup};
+pub use open::{GroupDigests, OpenRow, PAGES, RunLink, open_rows};
 
 /// Schema of `data.json`.
-pub(crate) const SCHEMA: &str = "darkqa.site/1";
+pub const SCHEMA: &str = "darkqa.site/1";
 
 /// Group in `data.json`.
 #[derive(Serialize)]
@@ -52,7 +52,7 @@ struct SiteData<'a> {
 ///
 /// # Errors
 /// If a file cannot be made.
-pub(crate) fn products(site: LeaderboardSite) -> Result<Vec<(String, Vec<u8>)>> {
+pub fn products(site: LeaderboardSite) -> Result<Vec<(String, Vec<u8>)>> {
     let tables: Vec<Table> = site.groups.iter().zip(1..).map(|(group, number)| table(number, group)).collect();
     // Tables of the same name share a file.
     let mut by_name = tables.clone();

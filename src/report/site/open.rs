@@ -8,16 +8,16 @@ use percent_encoding::{NON_ALPHANUMERIC, utf8_percent_encode};
 use serde::Serialize;
 
 use super::board::{BoardCell, BoardRow, BoardTable};
-use crate::report::text::table::ColumnKind::{Count, Share, Text};
-use crate::report::text::table::{Table, TableBuilder, TableCell};
-use crate::report::text::words;
-use crate::types::{AxisLevel, Variant, View};
+use crate::text::table::ColumnKind::{Count, Share, Text};
+use crate::text::table::{Table, TableBuilder, TableCell};
+use crate::text::words;
+use darkqa_base::types::{AxisLevel, Variant, View};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::open::{Group, OpenCell, OpenSummary};
 
 /// Scores (LLM-Match) of one model in one run by level, in one variant, raw or with an enhancer.
 #[derive(Debug, Clone)]
-pub(crate) struct OpenRow {
+pub struct OpenRow {
     model: String,
     run: RunLink,
     light: String,
@@ -37,7 +37,7 @@ struct LevelScore {
 }
 
 /// Rows of a run over all its questions. The clean frames are L0 of every variant without an enhancer.
-pub(crate) fn open_rows(summary: &OpenSummary, run: &RunLink) -> Vec<OpenRow> {
+pub fn open_rows(summary: &OpenSummary, run: &RunLink) -> Vec<OpenRow> {
     let cells: Vec<&OpenCell> = summary.cells.iter().filter(|cell| cell.group == Group::All).collect();
     let with_images: Vec<&OpenCell> =
         cells.iter().copied().filter(|cell| cell.subject.view == Some(View::Image)).collect();
@@ -156,24 +156,24 @@ fn board_row(row: &OpenRow, levels: &BTreeSet<AxisLevel>, has_blind: bool) -> Bo
 }
 
 /// Folder of the pages of runs.
-pub(crate) const PAGES: &str = "runs";
+pub const PAGES: &str = "runs";
 
 /// Name and page of a run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub(crate) struct RunLink {
+pub struct RunLink {
     /// Name of the run: its folder.
-    pub(crate) name: String,
+    pub name: String,
     /// File name of the run's page.
-    pub(crate) page: String,
+    pub page: String,
     /// Day on which the run was last written.
-    pub(crate) date: String,
+    pub date: String,
     /// Version of the program that made the run.
-    pub(crate) version: String,
+    pub version: String,
 }
 
 impl RunLink {
     /// Path of the page relative to the leaderboard.
-    pub(crate) fn path(&self) -> String {
+    pub fn path(&self) -> String {
         format!("{PAGES}/{}", self.page)
     }
 
@@ -195,11 +195,11 @@ impl RunLink {
 
 /// Digests of the settings that must be equal for the rows of a group to be comparable.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
-pub(crate) struct GroupDigests {
+pub struct GroupDigests {
     /// Digest of the questions with their texts and choices.
-    pub(crate) questions: String,
+    pub questions: String,
     /// Digest of all settings that determine the raw images.
-    pub(crate) light: String,
+    pub light: String,
     /// Digest of the prompt text around the questions; empty if the runs do not record it.
-    pub(crate) prompts: String,
+    pub prompts: String,
 }

@@ -2,10 +2,10 @@
 //!
 //! Table of replies, unreadable replies and failures for each model in a condition.
 
-use crate::report::text::table::ColumnKind::{Count, Failures, Number, Percent, Share, Text};
-use crate::report::text::table::{Table, TableBuilder};
-use crate::report::text::words::percent;
-use crate::types::{FailureKind, UnreadReason};
+use crate::text::table::ColumnKind::{Count, Failures, Number, Percent, Share, Text};
+use crate::text::table::{Table, TableBuilder};
+use crate::text::words::percent;
+use darkqa_base::types::{FailureKind, UnreadReason};
 use darkqa_score::accuracies::Health;
 use darkqa_score::answers::confusion::{Collapse, Confusion, Hallucination};
 use darkqa_score::findings::Findings;
@@ -25,7 +25,7 @@ fn hallucination(rates: &[Hallucination]) -> Table {
 }
 
 /// Starts a table of the answer that each model gives most often, with its share. The caller adds further columns.
-pub(crate) fn commonest_answers<'a>(
+pub fn commonest_answers<'a>(
     name: &'static str,
     caption: &str,
     confusions: &'a [Confusion],
@@ -68,7 +68,7 @@ struct ConfusionCell<'a> {
 
 /// Confusion matrix as a table: the number of replies for each expected answer and each answer given to it. The answer
 /// given is empty if none could be parsed. `expected_head` is the head of the column of expected answers.
-pub(crate) fn counted_answers(name: &'static str, expected_head: &'static str, confusions: &[Confusion]) -> Table {
+pub fn counted_answers(name: &'static str, expected_head: &'static str, confusions: &[Confusion]) -> Table {
     let mut cells = Vec::new();
     for confusion in confusions {
         for (expected, row) in confusion.counts.iter().enumerate() {
@@ -124,7 +124,7 @@ const OTHER: [UnreadReason; 5] = [
 ];
 
 /// Builds the table of parse health.
-pub(crate) fn health(health: &[Health]) -> Table {
+pub fn health(health: &[Health]) -> Table {
     let mut builder = TableBuilder::new("health", health)
         .page("health", "Replies and failures by subject")
         .subject(|health| &health.subject, ToString::to_string)

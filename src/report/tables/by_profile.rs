@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use crate::report::text::table::ColumnKind::{Count, Number, P, Text};
-use crate::report::text::table::{ColumnHeads, Table, TableBuilder, TableCell};
-use crate::report::text::words::{self, ends_in_points, points, reach, stops};
-use crate::types::degradations::Kind;
-use crate::types::text::counted;
-use crate::types::{AxisLevel, ProfileName};
+use crate::text::table::ColumnKind::{Count, Number, P, Text};
+use crate::text::table::{ColumnHeads, Table, TableBuilder, TableCell};
+use crate::text::words::{self, ends_in_points, points, reach, stops};
+use darkqa_base::types::degradations::Kind;
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{AxisLevel, ProfileName};
 use darkqa_score::accuracies::Curve;
 use darkqa_score::comparisons::{ClaimVerdict, EffectInProfile, FindingByProfile, NoiseHypothesis, Robustness};
 use darkqa_score::findings::Findings;
@@ -284,7 +284,7 @@ fn notes(found: &[FindingByProfile]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::Severity;
+    use darkqa_base::types::Severity;
     use darkqa_score::comparisons::Tested;
     use darkqa_score::estimate::Estimate;
 
@@ -320,7 +320,7 @@ mod tests {
         assert_eq!(effect(&finding.effects[2]), "+1.9 [−1.2, +5.0] open");
         finding.effects[1] = effect_in("eld", -0.4, -0.2, ClaimVerdict::Opposite);
         finding.effects[2].effect = None;
-        finding.claim = NoiseHypothesis::EnhancerHarms(crate::types::EnhancerName::new("ruas").unwrap());
+        finding.claim = NoiseHypothesis::EnhancerHarms(darkqa_base::types::EnhancerName::new("ruas").unwrap());
         assert_eq!(
             sentence(&finding),
             "ruas harms at L5: holds under paper; the opposite under eld (−40.0 to −20.0 points); not asked under physical."

@@ -1,9 +1,9 @@
 //! Tables of the calibration of confidence, and of probabilities by the position of a choice.
 
-use crate::report::text::table::ColumnKind::{Count, Number, Percent, Points, Ratio, Share, Text};
-use crate::report::text::table::{Table, TableBuilder, TableCell};
-use crate::report::text::words::light;
-use crate::types::questions::letter;
+use crate::text::table::ColumnKind::{Count, Number, Percent, Points, Ratio, Share, Text};
+use crate::text::table::{Table, TableBuilder, TableCell};
+use crate::text::words::light;
+use darkqa_base::types::questions::letter;
 use darkqa_score::auc::Auc;
 use darkqa_score::calibration::{Calibration, PositionShare, ReliabilityBin};
 use darkqa_score::estimate::Estimate;

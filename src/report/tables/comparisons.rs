@@ -9,11 +9,11 @@ use std::ops::Range;
 
 use super::pooled::too_few_clusters;
 use super::sections::{COMPARISONS, ENHANCERS, REAL};
-use crate::error::Result;
-use crate::report::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
-use crate::report::text::table::{self, Column, Table, TableBuilder, TableCell, TableFormat};
-use crate::report::text::words::{marked_reference, name};
-use crate::types::text::counted;
+use crate::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
+use crate::text::table::{self, Column, Table, TableBuilder, TableCell, TableFormat};
+use crate::text::words::{marked_reference, name};
+use darkqa_base::error::Result;
+use darkqa_base::types::text::counted;
 use darkqa_score::accuracies::FirstFailure;
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::cluster::ClusterUnit;
@@ -40,11 +40,7 @@ pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
 }
 
 /// Tables of the differences in agreement with the answers at L0. The file's last column is the name of the measure.
-pub(crate) fn agreement_comparisons(
-    comparisons: &[Comparison],
-    unit: ClusterUnit,
-    measure: &'static str,
-) -> Vec<Table> {
+pub fn agreement_comparisons(comparisons: &[Comparison], unit: ClusterUnit, measure: &'static str) -> Vec<Table> {
     let mut tables = tables_by_kind(comparisons, unit, |kind| kind.agreement);
     for table in &mut tables {
         let caption = format!("{}, paired by question, in percentage points.", table.caption);
@@ -346,7 +342,7 @@ fn second_side_label(comparison: &Comparison) -> String {
 }
 
 /// Name of the file.
-pub(crate) const FLIPS: &str = "flips.csv";
+pub const FLIPS: &str = "flips.csv";
 
 /// Number of rows in a part (chosen): small enough for memory, large enough for speed.
 const PART_ROWS: usize = 4096;
@@ -355,7 +351,7 @@ const PART_ROWS: usize = 4096;
 ///
 /// # Errors
 /// If the output cannot be written.
-pub(crate) fn write_flips(findings: &Findings<'_>, out: &mut dyn Write) -> Result<()> {
+pub fn write_flips(findings: &Findings<'_>, out: &mut dyn Write) -> Result<()> {
     let items = findings.grid.items.len();
     let parts = findings.first_failures.iter().flat_map(|failure| {
         (0..items).step_by(PART_ROWS).map(move |start| part(findings, failure, start..items.min(start + PART_ROWS)))

@@ -3,12 +3,12 @@
 use std::collections::BTreeSet;
 
 use super::sections::ENHANCERS;
-use crate::report::sentences::level_runs;
-use crate::report::text::table::ColumnKind::Text;
-use crate::report::text::table::{Table, TableBuilder};
-use crate::report::text::words::{light, points};
-use crate::types::manifests::{EnhancerLatency, milliseconds};
-use crate::types::{AxisLevel, Variant};
+use crate::sentences::level_runs;
+use crate::text::table::ColumnKind::Text;
+use crate::text::table::{Table, TableBuilder};
+use crate::text::words::{light, points};
+use darkqa_base::types::manifests::{EnhancerLatency, milliseconds};
+use darkqa_base::types::{AxisLevel, Variant};
 use darkqa_score::comparisons::{Claim, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::is_observer;
@@ -16,23 +16,23 @@ use darkqa_score::significance::Verdict;
 
 /// Use of an enhancer in one or more runs.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct EnhancerRow {
+pub struct EnhancerRow {
     /// Name of the enhancer, with the names of its runs if others used it in another way.
-    pub(crate) name: String,
+    pub name: String,
     /// Name of the enhancer in the findings.
-    pub(crate) enhancer: String,
+    pub enhancer: String,
     /// Input and output conventions of the model, and changes of image size.
-    pub(crate) how: String,
+    pub how: String,
     /// Appearance of its images of the probe and of the run's dark frames.
-    pub(crate) looks: String,
+    pub looks: String,
     /// Times that the runs measured; empty without any.
-    pub(crate) latency: Vec<EnhancerLatency>,
+    pub latency: Vec<EnhancerLatency>,
 }
 
 /// Builds the table; `None` without an enhancer. `effects` are the effects of all enhancers.
 ///
 /// The times differ between equal runs, so only the page has them.
-pub(crate) fn enhancers(rows: &[EnhancerRow], effects: &[&PooledFinding]) -> Option<Table> {
+pub fn enhancers(rows: &[EnhancerRow], effects: &[&PooledFinding]) -> Option<Table> {
     if rows.is_empty() {
         return None;
     }
@@ -60,7 +60,7 @@ pub(crate) fn enhancers(rows: &[EnhancerRow], effects: &[&PooledFinding]) -> Opt
 
 /// The effects of all enhancers over all families: the means over levels, and the levels that no mean includes. A mean
 /// is left out if no level of it can have a verdict.
-pub(crate) fn enhancer_effects<'f>(findings: &'f Findings<'_>) -> Vec<&'f PooledFinding> {
+pub fn enhancer_effects<'f>(findings: &'f Findings<'_>) -> Vec<&'f PooledFinding> {
     let is_effect = |finding: &&PooledFinding| finding.kind == PooledKind::Enhancer && finding.family.is_none();
     let levels: Vec<&PooledFinding> = findings.pooled.iter().filter(is_effect).collect();
     let is_in = |level: &PooledFinding, mean: &PooledFinding| {
@@ -78,7 +78,7 @@ pub(crate) fn enhancer_effects<'f>(findings: &'f Findings<'_>) -> Vec<&'f Pooled
 /// with noise (0.11 points per ms); no help found at L1–L3 with noise`. `None` without effects and times.
 ///
 /// Points per millisecond are given for detected help alone. Of several times, the longest counts.
-pub(crate) fn help_for_time(enhancer: &str, effects: &[&PooledFinding], latency: &[EnhancerLatency]) -> Option<String> {
+pub fn help_for_time(enhancer: &str, effects: &[&PooledFinding], latency: &[EnhancerLatency]) -> Option<String> {
     let medians = || latency.iter().map(|latency| latency.median_ms);
     let longest = medians().max_by(f64::total_cmp);
     let time = medians().min_by(f64::total_cmp).zip(longest).map(|(shortest, longest)| {
@@ -172,7 +172,7 @@ fn significant(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::sentences::tests::finding;
+    use crate::sentences::tests::finding;
 
     fn took(width: usize, median_ms: f64) -> EnhancerLatency {
         EnhancerLatency {

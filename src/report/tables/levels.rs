@@ -4,22 +4,22 @@
 //! below that of a model without images.
 
 use super::sections::ACCURACY;
-use crate::report::text::ladder::{Ladder, LadderRow};
-use crate::report::text::latex::escape;
-use crate::report::text::table::ColumnKind::{self, Count, Percent, Text};
-use crate::report::text::table::{ColumnHeads, Table, TableBuilder, TableCell, TableFormat, TableRow};
-use crate::report::text::terminal::{differing, texts};
-use crate::report::text::words::{ends, family as family_name, marked_reference, percent};
-use crate::types::degradations::Axis;
-use crate::types::text::{counted, plural};
-use crate::types::{Family, UnreadReason};
+use crate::text::ladder::{Ladder, LadderRow};
+use crate::text::latex::escape;
+use crate::text::table::ColumnKind::{self, Count, Percent, Text};
+use crate::text::table::{ColumnHeads, Table, TableBuilder, TableCell, TableFormat, TableRow};
+use crate::text::terminal::{differing, texts};
+use crate::text::words::{ends, family as family_name, marked_reference, percent};
+use darkqa_base::types::degradations::Axis;
+use darkqa_base::types::text::{counted, plural};
+use darkqa_base::types::{Family, UnreadReason};
 use darkqa_score::accuracies::{AccuracyCell, AccuracySummary};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::ModelInCondition;
 
 /// Name of the tables of accuracies or scores by level.
-pub(crate) const LEVELS: &str = "levels";
+pub const LEVELS: &str = "levels";
 
 /// Tables over all items and, if the models were asked different items, also over the items that they share.
 pub(super) fn levels(findings: &Findings<'_>) -> Vec<Table> {
@@ -210,7 +210,7 @@ fn note_without_images(summary: &AccuracySummary, cell: &AccuracyCell) -> String
 }
 
 /// Note with the number of unreadable replies by reason, for reasons that do not concern the form of the answer.
-pub(crate) fn unread_note(summary: &AccuracySummary) -> Option<String> {
+pub fn unread_note(summary: &AccuracySummary) -> Option<String> {
     let reasons = [
         (UnreadReason::Truncated, "cut at the token limit (--max-tokens)"),
         (UnreadReason::Refused, "refused"),

@@ -21,10 +21,10 @@ mod strict_groups;
 mod thresholds;
 mod variation;
 
-use crate::report::text::table::ColumnKind::{Count, Number, P, Percent, Ratio, Share, Text};
-use crate::report::text::table::{SUMMARY, Table, TableBuilder, TableCell};
-use crate::report::text::words::{family, light, name};
-use crate::types::{EnhancerName, Family, ModelListing, Variant, View};
+use crate::text::table::ColumnKind::{Count, Number, P, Percent, Ratio, Share, Text};
+use crate::text::table::{SUMMARY, Table, TableBuilder, TableCell};
+use crate::text::words::{family, light, name};
+use darkqa_base::types::{EnhancerName, Family, ModelListing, Variant, View};
 use darkqa_score::accuracies::AccuracySummary;
 use darkqa_score::auc::Auc;
 use darkqa_score::comparisons::Agreement;
@@ -34,19 +34,19 @@ use darkqa_score::photographs::{ConditionFidelity, FidelityFindings, PairDarknes
 use darkqa_score::significance::ALPHA;
 use sections::REAL;
 
-pub(crate) use answers::{commonest_answers, counted_answers, health};
-pub(crate) use comparisons::{FLIPS, agreement_comparisons, write_flips};
-pub(crate) use enhancer_use::{EnhancerRow, enhancer_effects, enhancers, help_for_time};
-pub(crate) use levels::{LEVELS, unread_note};
-pub(crate) use observer::{control_text, notes as observer_notes};
-pub(crate) use pooled::baseline;
-pub(crate) use sections::{ACCURACY, BASELINE, ENHANCERS, SECTIONS, Section, with_training};
-pub(crate) use strict_groups::strict_groups;
-pub(crate) use thresholds::{in_lux, missing_threshold_reason};
+pub use answers::{commonest_answers, counted_answers, health};
+pub use comparisons::{FLIPS, agreement_comparisons, write_flips};
+pub use enhancer_use::{EnhancerRow, enhancer_effects, enhancers, help_for_time};
+pub use levels::{LEVELS, unread_note};
+pub use observer::{control_text, notes as observer_notes};
+pub use pooled::baseline;
+pub use sections::{ACCURACY, BASELINE, ENHANCERS, SECTIONS, Section, with_training};
+pub use strict_groups::strict_groups;
+pub use thresholds::{in_lux, missing_threshold_reason};
 
 /// All tables of an evaluation; the first is the summary. A hidden observer is only in the files.
 #[must_use]
-pub(crate) fn tables(findings: &Findings<'_>) -> Vec<Table> {
+pub fn tables(findings: &Findings<'_>) -> Vec<Table> {
     let Some(shown) = &findings.without_observer else {
         return all_tables(findings);
     };
@@ -87,11 +87,8 @@ fn all_tables(findings: &Findings<'_>) -> Vec<Table> {
 
 impl<T> TableBuilder<T> {
     /// Adds columns for the model and condition of a row.
-    pub(crate) fn subject(
-        self,
-        subject: impl Fn(&T) -> &ModelInCondition,
-        variant: impl Fn(&Variant) -> String,
-    ) -> Self {
+    #[must_use]
+    pub fn subject(self, subject: impl Fn(&T) -> &ModelInCondition, variant: impl Fn(&Variant) -> String) -> Self {
         self.column(Text, "csv model", |row| subject(row).model.clone())
             .column(Text, "csv view", |row| TableCell::from(subject(row).view.map(|view| view.to_string())))
             .column(Text, "csv level", |row| TableCell::from(subject(row).level.map(|level| level.to_string())))
@@ -104,7 +101,8 @@ impl<T> TableBuilder<T> {
 
     /// Adds columns for the models' group, in files if any model has one, and for the facts that the user gave about
     /// models.
-    pub(crate) fn model_facts(mut self, listing: &ModelListing, subject: impl Fn(&T) -> &ModelInCondition) -> Self {
+    #[must_use]
+    pub fn model_facts(mut self, listing: &ModelListing, subject: impl Fn(&T) -> &ModelInCondition) -> Self {
         if listing.has_groups() {
             self = self.column(Text, "csv model_group", |row| {
                 TableCell::from(listing.group(&subject(row).model).map(str::to_owned))
@@ -128,7 +126,8 @@ impl<T> TableBuilder<T> {
     }
 
     /// Adds columns for the family of a row; no family stands for all families together.
-    pub(crate) fn family(self, row_family: impl Fn(&T) -> Option<&Family>) -> Self {
+    #[must_use]
+    pub fn family(self, row_family: impl Fn(&T) -> Option<&Family>) -> Self {
         self.column(Text, "csv family", |row| row_family(row).map_or(Family::TOTAL, Family::name).to_owned()).column(
             Text,
             "page family",
@@ -138,7 +137,7 @@ impl<T> TableBuilder<T> {
 }
 
 /// Builds the table, with a row for each model in a condition, family and way of parsing.
-pub(crate) fn summary_rows(summary: &AccuracySummary, listing: &ModelListing) -> Table {
+pub fn summary_rows(summary: &AccuracySummary, listing: &ModelListing) -> Table {
     let builder = TableBuilder::new(SUMMARY, &summary.cells)
         .subject(|cell| &cell.subject, |variant| variant.word().into_owned())
         .family(|cell| cell.family.as_ref())

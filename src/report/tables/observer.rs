@@ -1,10 +1,10 @@
 //! Tables of the known-signal observer: its score in each condition, and its controls.
 
-use crate::report::text::table::ColumnKind::{Count, Percent, Share, Text};
-use crate::report::text::table::{Table, TableBuilder, TableFormat};
-use crate::report::text::words::percent;
-use crate::types::Control;
-use crate::types::replies::OBSERVER;
+use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
+use crate::text::table::{Table, TableBuilder, TableFormat};
+use crate::text::words::percent;
+use darkqa_base::types::Control;
+use darkqa_base::types::replies::OBSERVER;
 use darkqa_score::findings::Findings;
 use darkqa_score::observed::{ObserverCell, ObserverSummary};
 
@@ -95,7 +95,7 @@ fn controls(observer: &ObserverSummary) -> Table {
 }
 
 /// Warnings: a control that is not at chance, a missing control, and images of changed geometry.
-pub(crate) fn notes(observer: &ObserverSummary) -> Vec<String> {
+pub fn notes(observer: &ObserverSummary) -> Vec<String> {
     if !observer.is_asked() {
         return Vec::new();
     }
@@ -129,7 +129,7 @@ pub(crate) fn notes(observer: &ObserverSummary) -> Vec<String> {
 }
 
 /// Text that describes a standing control by the images it is shown.
-pub(crate) fn control_text(control: &ObserverCell) -> &'static str {
+pub fn control_text(control: &ObserverCell) -> &'static str {
     if Control::from_model_name(&control.subject.model) == Some(Control::OtherRoom) {
         "the same observer, shown images of other rooms"
     } else {

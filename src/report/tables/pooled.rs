@@ -7,13 +7,13 @@
 use std::collections::BTreeSet;
 
 use super::sections::{BASELINE, COMPARISONS};
-use crate::report::sentences::{dark_levels, left_out};
-use crate::report::text::latex::escape;
-use crate::report::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
-use crate::report::text::table::{Table, TableBuilder, TableCell};
-use crate::report::text::words::{light, p, points};
-use crate::types::EnhancerName;
-use crate::types::text::counted;
+use crate::sentences::{dark_levels, left_out};
+use crate::text::latex::escape;
+use crate::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
+use crate::text::table::{Table, TableBuilder, TableCell};
+use crate::text::words::{light, p, points};
+use darkqa_base::types::EnhancerName;
+use darkqa_base::types::text::counted;
 use darkqa_score::answers::confusion::FalseAnswer;
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::{
@@ -250,7 +250,7 @@ pub(super) fn best(findings: &Findings<'_>) -> Table {
 
 /// Builds the table of paired differences; `old` is the name of the baseline run.
 #[must_use]
-pub(crate) fn baseline(rows: &[BaselineRow], old: &str) -> Table {
+pub fn baseline(rows: &[BaselineRow], old: &str) -> Table {
     let difference = "csv difference low high | terminal new less old, 95 % interval | page new less old [95 %] \
                       | latex Difference [95\\,\\%]";
     let builder = TableBuilder::new(BASELINE, rows)

@@ -6,18 +6,18 @@
 
 use super::calibration::CONFIDENCE;
 use super::variation::VARIATION;
-use crate::report::text::table::ColumnKind::{Count, Percent, Share, Text};
-use crate::report::text::table::{Table, TableBuilder, TableCell};
-use crate::report::text::words::{names_enhancer, percent};
-use crate::types::ModelListing;
+use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
+use crate::text::table::{Table, TableBuilder, TableCell};
+use crate::text::words::{names_enhancer, percent};
+use darkqa_base::types::ModelListing;
 use darkqa_score::accuracies::AccuracySummary;
 use darkqa_score::choice::ParsingMode;
 
 /// Section of the page: id, title, text below the title, and names of its figures.
-pub(crate) type Section = (&'static str, &'static str, &'static str, &'static [&'static str]);
+pub type Section = (&'static str, &'static str, &'static str, &'static [&'static str]);
 
 /// All sections of the page in order.
-pub(crate) const SECTIONS: [Section; 16] = [
+pub const SECTIONS: [Section; 16] = [
     (
         BASELINE,
         "Against the baseline",
@@ -135,19 +135,19 @@ pub(crate) const SECTIONS: [Section; 16] = [
 ];
 
 /// Id of the section on differences from a baseline, and name of its table.
-pub(crate) const BASELINE: &str = "baseline";
+pub const BASELINE: &str = "baseline";
 
 /// Id of the section on photographs in the dark.
-pub(crate) const REAL: &str = "real";
+pub(super) const REAL: &str = "real";
 
 /// Id of the section on paired differences.
 pub(super) const COMPARISONS: &str = "comparisons";
 
 /// Id of the section on accuracy, which also has the sample images if no enhancer ran.
-pub(crate) const ACCURACY: &str = "accuracy";
+pub const ACCURACY: &str = "accuracy";
 
 /// Id of the section on enhancers, which also has the sample images.
-pub(crate) const ENHANCERS: &str = "enhancers";
+pub const ENHANCERS: &str = "enhancers";
 
 pub(super) fn subjects(summary: &AccuracySummary) -> Table {
     let builder = TableBuilder::new("subjects", summary.family_cells(None, ParsingMode::Strict))
@@ -180,7 +180,7 @@ pub(super) fn subjects(summary: &AccuracySummary) -> Table {
 }
 
 /// Adds a note on the training data of an enhancer, if known, to each table that has its results.
-pub(crate) fn with_training(mut tables: Vec<Table>, listing: &ModelListing) -> Vec<Table> {
+pub fn with_training(mut tables: Vec<Table>, listing: &ModelListing) -> Vec<Table> {
     for (enhancer, training) in listing.trainings() {
         for table in tables.iter_mut().filter(|table| has_results(table, enhancer)) {
             let line = format!("{enhancer}: {training}");
@@ -210,8 +210,8 @@ fn has_results(table: &Table, enhancer: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::text::table::ColumnKind::Text;
-    use crate::report::text::table::TableBuilder;
+    use crate::text::table::ColumnKind::Text;
+    use crate::text::table::TableBuilder;
 
     fn table(condition: &'static str) -> Table {
         TableBuilder::new("levels", [condition])

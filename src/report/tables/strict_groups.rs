@@ -1,9 +1,9 @@
 //! Table of the strict score: the share of question groups with all questions right.
 
-use crate::report::text::table::ColumnKind::{Count, Percent, Share, Text};
-use crate::report::text::table::{Table, TableBuilder, TableCell, TableFormat};
-use crate::types::text::counted;
-use crate::types::{Family, Variant};
+use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
+use crate::text::table::{Table, TableBuilder, TableCell, TableFormat};
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{Family, Variant};
 use darkqa_score::accuracies::{GroupCell, GroupChance, StrictScore};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::estimate::Estimate;
@@ -19,7 +19,7 @@ enum GroupRow<'a> {
 }
 
 /// Two tables: all families together, and by family. Empty if the questions have no groups.
-pub(crate) fn strict_groups(findings: &Findings<'_>) -> Vec<Table> {
+pub fn strict_groups(findings: &Findings<'_>) -> Vec<Table> {
     let Some(score) = &findings.strict else {
         return Vec::new();
     };

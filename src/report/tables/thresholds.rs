@@ -7,12 +7,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::sections::ACCURACY;
-use crate::report::text::table::ColumnKind::{Count, Number, Percent, Share, Text, Threshold};
-use crate::report::text::table::{ColumnHeads, Table, TableBuilder, TableCell};
-use crate::report::text::words::{family as family_name, light, lux, lux_at, points};
-use crate::types::degradations::Axis;
-use crate::types::text::{counted, plural};
-use crate::types::{AxisLevel, Family, FrameId, Variant};
+use crate::text::table::ColumnKind::{Count, Number, Percent, Share, Text, Threshold};
+use crate::text::table::{ColumnHeads, Table, TableBuilder, TableCell};
+use crate::text::words::{family as family_name, light, lux, lux_at, points};
+use darkqa_base::types::degradations::Axis;
+use darkqa_base::types::text::{counted, plural};
+use darkqa_base::types::{AxisLevel, Family, FrameId, Variant};
 use darkqa_score::accuracies::Curve;
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::{PooledFinding, PooledKind};
@@ -126,7 +126,7 @@ fn table(titles: &Titles, caption: &str, curves: &[&Curve], mode: ParsingMode, l
 
 /// Adds the light at a threshold, in lux, with its interval; no column if the light at L0, `at_l0`, is not known.
 /// `threshold` also gives the darkest level, in EV: the light at a threshold beyond it is not known.
-pub(crate) fn in_lux<T>(
+pub fn in_lux<T>(
     builder: TableBuilder<T>,
     at_l0: Option<f64>,
     threshold: impl Fn(&T) -> Option<(DropThreshold, f64)>,
@@ -158,7 +158,7 @@ pub(crate) fn in_lux<T>(
 }
 
 /// Text for the reason why a curve has no threshold.
-pub(crate) fn missing_threshold_reason(reason: &NoThreshold) -> String {
+pub fn missing_threshold_reason(reason: &NoThreshold) -> String {
     match reason {
         NoThreshold::NotAboveChance => "not clearly above the floor at L0".to_owned(),
         NoThreshold::Thin(level) => thin_level_text(level),

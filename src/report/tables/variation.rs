@@ -1,10 +1,10 @@
 //! Tables of a run that asked in several wordings, orders or draws: where the variation comes from, and whether each
 //! difference holds in all of them.
 
-use crate::report::text::table::ColumnKind::{Count, P, Percent, Points, Share, Text};
-use crate::report::text::table::{Table, TableBuilder, TableCell};
-use crate::report::text::words::name;
-use crate::types::questions::letter;
+use crate::text::table::ColumnKind::{Count, P, Percent, Points, Share, Text};
+use crate::text::table::{Table, TableBuilder, TableCell};
+use crate::text::words::name;
+use darkqa_base::types::questions::letter;
 use darkqa_score::findings::Findings;
 use darkqa_score::variation::{AccuracyVariation, Facet, FacetRange, RunVariation, Source};
 

@@ -1,10 +1,10 @@
 //! Warnings above the numbers of a report: [`Alert`].
 
-use crate::report::text::terminal::line;
+use crate::text::terminal::line;
 use serde::Serialize;
 
 /// Share of unreadable replies above which an alert names the model; chosen.
-pub(crate) const MAX_UNREAD: f64 = 0.02;
+pub const MAX_UNREAD: f64 = 0.02;
 
 /// One line above a report.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -85,6 +85,6 @@ pub enum AlertKind {
 
 /// The alerts as lines of the terminal, each marked with `!`; empty without an alert.
 #[must_use]
-pub(crate) fn lines(alerts: &[Alert]) -> String {
+pub fn lines(alerts: &[Alert]) -> String {
     alerts.iter().map(|alert| line("! ", &alert.text, "  ")).collect()
 }

@@ -2,21 +2,21 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::report::text::table::ColumnKind::{self, Text};
-use crate::report::text::table::{TableBuilder, TableCell, TableFormat};
-use crate::report::text::words::{light, marked_reference};
-use crate::types::degradations::{Axis, Kind};
-use crate::types::{AxisLevel, EnhancerName, ModelListing, RunGroup, SetLight, Variant, View};
+use crate::text::table::ColumnKind::{self, Text};
+use crate::text::table::{TableBuilder, TableCell, TableFormat};
+use crate::text::words::{light, marked_reference};
+use darkqa_base::types::degradations::{Axis, Kind};
+use darkqa_base::types::{AxisLevel, EnhancerName, ModelListing, RunGroup, SetLight, Variant, View};
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::{CHANCE, ModelInCondition, is_reference};
 use darkqa_score::photographs::PairDarkness;
 
 /// A model in one variant, raw or with one enhancer.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct LadderSeries<'a> {
+pub struct LadderSeries<'a> {
     /// The place of the model among those of the ladder.
     place: usize,
-    pub(crate) model: &'a str,
+    pub model: &'a str,
     enhancer: Option<&'a EnhancerName>,
     variant: &'a Variant,
 }
@@ -27,18 +27,18 @@ impl<'a> LadderSeries<'a> {
     }
 
     /// True if the images are enhanced.
-    pub(crate) fn is_enhanced(&self) -> bool {
+    pub fn is_enhanced(&self) -> bool {
         self.enhancer.is_some()
     }
 
     /// The axis of the levels, which is light for the darkness of pairs; `None` for untouched frames.
-    pub(crate) fn axis(&self) -> Option<Axis> {
+    pub fn axis(&self) -> Option<Axis> {
         let pair = self.variant.pair.as_ref().map(|_| Axis::LIGHT);
         self.variant.kind.map(Kind::axis).or(pair)
     }
 
     /// The variant and the enhancer in words; for photographs also their darkness.
-    pub(crate) fn light(&self, pairs: &[PairDarkness]) -> String {
+    pub fn light(&self, pairs: &[PairDarkness]) -> String {
         let words = light(self.variant, self.enhancer);
         let pair = pairs.iter().find(|pair| Some(&pair.name) == self.variant.photograph());
         match pair {
@@ -49,26 +49,26 @@ impl<'a> LadderSeries<'a> {
 }
 
 /// The cells of one series by level.
-pub(crate) type SeriesByLevel<'a, C> = BTreeMap<AxisLevel, &'a C>;
+pub type SeriesByLevel<'a, C> = BTreeMap<AxisLevel, &'a C>;
 
 /// The cells of all subjects.
-pub(crate) struct Ladder<'a, C> {
+pub struct Ladder<'a, C> {
     /// The models in the order of their first cells.
-    pub(crate) models: Vec<&'a str>,
+    pub models: Vec<&'a str>,
     /// The levels of all series.
-    pub(crate) levels: BTreeSet<AxisLevel>,
+    pub levels: BTreeSet<AxisLevel>,
     /// Cells of models with images.
-    pub(crate) series: BTreeMap<LadderSeries<'a>, SeriesByLevel<'a, C>>,
+    pub series: BTreeMap<LadderSeries<'a>, SeriesByLevel<'a, C>>,
     /// Cells without a level: models without images, and chance.
-    pub(crate) without_level: Vec<(&'a ModelInCondition, &'a C)>,
+    pub without_level: Vec<(&'a ModelInCondition, &'a C)>,
     /// The darkness of the photographs in the dark.
-    pub(crate) pairs: &'a [PairDarkness],
+    pub pairs: &'a [PairDarkness],
     /// The light in which the photographs of the set were taken.
-    pub(crate) set: SetLight,
+    pub set: SetLight,
 }
 
 impl<'a, C> Ladder<'a, C> {
-    pub(crate) fn new(cells: impl Iterator<Item = (&'a ModelInCondition, &'a C)>) -> Self {
+    pub fn new(cells: impl Iterator<Item = (&'a ModelInCondition, &'a C)>) -> Self {
         let mut ladder = Self {
             models: Vec::new(),
             levels: BTreeSet::new(),
@@ -95,12 +95,13 @@ impl<'a, C> Ladder<'a, C> {
     }
 
     /// Adds the darkness of the photographs, and the light of the set, which decides the label of L0.
-    pub(crate) fn with_pairs(self, findings: &'a Findings<'_>) -> Self {
+    #[must_use]
+    pub fn with_pairs(self, findings: &'a Findings<'_>) -> Self {
         Self { pairs: &findings.pairs, set: findings.set.light, ..self }
     }
 
     /// The variant and the enhancer of a series in words.
-    pub(crate) fn light(&self, series: &LadderSeries<'_>) -> String {
+    pub fn light(&self, series: &LadderSeries<'_>) -> String {
         let words = series.light(self.pairs);
         match self.set {
             SetLight::Lit => words,
@@ -109,7 +110,7 @@ impl<'a, C> Ladder<'a, C> {
     }
 
     /// The column head of a level.
-    pub(crate) fn head(&self, level: AxisLevel) -> String {
+    pub fn head(&self, level: AxisLevel) -> String {
         match level {
             AxisLevel::L0 => self.set.l0_label().to_owned(),
             level => level.to_string(),
@@ -124,7 +125,8 @@ impl<'a, C> Ladder<'a, C> {
     /// Adds the cells of the clean frames to every series of the same model without an enhancer, and those of the
     /// enhanced clean frames to every series with that enhancer. They stay a separate series only if the model has no
     /// such series.
-    pub(crate) fn with_clean(mut self) -> Self {
+    #[must_use]
+    pub fn with_clean(mut self) -> Self {
         let (clean, mut degraded): (BTreeMap<_, _>, BTreeMap<_, _>) =
             self.series.into_iter().partition(|(series, _)| series.variant.is_untouched());
         for (series, cells) in clean {
@@ -147,7 +149,7 @@ impl<'a, C> Ladder<'a, C> {
     }
 
     /// The ladder of each axis, light first. Series and cells without an axis are in each of them.
-    pub(crate) fn by_axis(&self) -> Vec<(Axis, Self)> {
+    pub fn by_axis(&self) -> Vec<(Axis, Self)> {
         Axis::present(|axis| self.series.keys().any(|series| series.axis() == Some(axis)))
             .into_iter()
             .map(|axis| {
@@ -171,7 +173,7 @@ impl<'a, C> Ladder<'a, C> {
 
     /// The cell of a series at L0, after [`with_clean`](Self::with_clean). For an enhancer without clean frames, the
     /// cell without an enhancer.
-    pub(crate) fn l0_cell(&self, series: &LadderSeries<'_>) -> Option<&'a C> {
+    pub fn l0_cell(&self, series: &LadderSeries<'_>) -> Option<&'a C> {
         let raw = self.series.iter().filter(|(other, _)| {
             let is_clean = other.variant.is_untouched();
             let groups = [*other, series].map(|series| series.variant.group.as_ref());
@@ -183,7 +185,7 @@ impl<'a, C> Ladder<'a, C> {
     }
 
     /// The rows of a table: the series of each model, and below them the model without images; chance at the end.
-    pub(crate) fn rows(&'a self) -> Vec<LadderRow<'a, C>> {
+    pub fn rows(&'a self) -> Vec<LadderRow<'a, C>> {
         let series = self.series.iter().map(|(series, cells)| (series.place, LadderRow::Series(series, cells)));
         let without_level = self.without_level.iter().map(|&(subject, cell)| {
             let place = subject.view.and_then(|_| self.place(&subject.model));
@@ -198,7 +200,7 @@ impl<'a, C> Ladder<'a, C> {
 
     /// A table with a row for each series and a column for each level, with the groups, marks and extra columns of the
     /// models. The page and LaTeX also have a row for each subject without a level.
-    pub(crate) fn table(
+    pub fn table(
         &'a self,
         name: &'static str,
         listing: &ModelListing,
@@ -243,7 +245,7 @@ impl<'a, C> Ladder<'a, C> {
 }
 
 /// A row of the table of a [`Ladder`].
-pub(crate) enum LadderRow<'a, C> {
+pub enum LadderRow<'a, C> {
     /// A series with its cells by level.
     Series(&'a LadderSeries<'a>, &'a SeriesByLevel<'a, C>),
     /// A subject without a level, and its cell.
@@ -278,12 +280,12 @@ impl<C> LadderRow<'_, C> {
     }
 
     /// Sum of a count over all levels of a series; 0 for a subject without a level.
-    pub(crate) fn sum(&self, count: impl Fn(&C) -> usize) -> usize {
+    pub fn sum(&self, count: impl Fn(&C) -> usize) -> usize {
         self.cells().map(count).sum()
     }
 
     /// The cells of a series; none for a subject without a level.
-    pub(crate) fn cells(&self) -> impl Iterator<Item = &C> + Clone {
+    pub fn cells(&self) -> impl Iterator<Item = &C> + Clone {
         let cells = match self {
             Self::Series(_, cells) => Some(*cells),
             Self::WithoutLevel(..) => None,

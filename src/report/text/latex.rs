@@ -2,15 +2,15 @@
 
 use std::fmt::Write;
 
-use crate::report::text::table::{ColumnKind, Table, TableCell, TableFormat};
-use crate::report::text::words::{interval, percent, points, words};
-use crate::types::text::escape_hidden;
+use crate::text::table::{ColumnKind, Table, TableCell, TableFormat};
+use crate::text::words::{interval, percent, points, words};
+use darkqa_base::types::text::escape_hidden;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::significance::Verdict;
 
 /// The findings as a list, then all tables that have a LaTeX caption. The first comment line begins with `head`.
 #[must_use]
-pub(crate) fn tables(head: &str, findings: &[String], tables: &[Table]) -> String {
+pub fn tables(head: &str, findings: &[String], tables: &[Table]) -> String {
     let mut text = format!(
         "% {head} of darkqa-eval; \\usepackage{{booktabs,graphicx}} in the preamble. Tables that are wider than the text are made smaller;\n\
          % `darkqa-eval figures RUN --format tex` sets the main ones at the width of a column.\n"
@@ -31,7 +31,7 @@ pub(crate) fn tables(head: &str, findings: &[String], tables: &[Table]) -> Strin
 }
 
 /// Escapes the special characters of LaTeX.
-pub(crate) fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in escape_hidden(text).chars() {
         match c {
@@ -61,7 +61,7 @@ pub(crate) fn escape(text: &str) -> String {
 const FIT: &str = "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}";
 
 /// Maximum number of rows of a table on one page, in `\footnotesize` with caption and footnote; chosen.
-pub(crate) const MAX_ROWS: usize = 40;
+pub const MAX_ROWS: usize = 40;
 
 /// A table as one or more floats of at most [`MAX_ROWS`] rows, no wider than the text.
 fn table(caption: &str, table: &Table) -> String {

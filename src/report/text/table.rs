@@ -9,9 +9,9 @@ use std::io::Write;
 
 use serde::{Serialize, Serializer};
 
-use crate::error::{Error, Result};
-use crate::types::PairDark;
-use crate::types::text::{escape_where, is_hidden};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::PairDark;
+use darkqa_base::types::text::{escape_where, is_hidden};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::significance::Verdict;
@@ -29,7 +29,7 @@ macro_rules! cell_from {
 }
 
 /// Name of the table of all accuracies, whose numbers are written with all their digits.
-pub(crate) const SUMMARY: &str = "summary";
+pub const SUMMARY: &str = "summary";
 
 /// A table of numbers. An output leaves the table out if the table has no title for it.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -179,7 +179,7 @@ cell_from! {
 
 impl TableCell {
     /// The noise profile of a subject, if it has one; the column `reading` of files.
-    pub(crate) fn profile(subject: &ModelInCondition) -> Self {
+    pub fn profile(subject: &ModelInCondition) -> Self {
         let variant = &subject.variant;
         let of_pair = variant.pair.as_ref().and_then(PairDark::reading);
         let profile = variant.reading.as_ref().or(of_pair);
@@ -187,7 +187,7 @@ impl TableCell {
     }
 
     /// The verdict of a comparison; blank if no sentence is about it.
-    pub(crate) fn verdict(verdict: Option<Verdict>) -> Self {
+    pub fn verdict(verdict: Option<Verdict>) -> Self {
         verdict.map_or(Self::Blank, Self::Verdict)
     }
 }
@@ -218,27 +218,29 @@ impl From<&str> for ColumnHeads {
 
 /// Builder of a table from items, one for each row. Columns are added one by one, and each computes its cells from the
 /// items.
-pub(crate) struct TableBuilder<T> {
+pub struct TableBuilder<T> {
     table: Table,
     items: Vec<T>,
 }
 
 impl<T> TableBuilder<T> {
-    pub(crate) fn new(name: &'static str, items: impl IntoIterator<Item = T>) -> Self {
+    pub fn new(name: &'static str, items: impl IntoIterator<Item = T>) -> Self {
         let items: Vec<T> = items.into_iter().collect();
         let table = Table { name, rows: items.iter().map(|_| TableRow::with_capacity()).collect(), ..Table::default() };
         Self { table, items }
     }
 
     /// Sets the section of the page and the caption there.
-    pub(crate) fn page(mut self, section: &'static str, caption: &str) -> Self {
+    #[must_use]
+    pub fn page(mut self, section: &'static str, caption: &str) -> Self {
         self.table.section = section;
         caption.clone_into(&mut self.table.caption);
         self
     }
 
     /// Adds a column; `cell` computes the cell of an item.
-    pub(crate) fn column<C: Into<TableCell>>(
+    #[must_use]
+    pub fn column<C: Into<TableCell>>(
         mut self,
         kind: ColumnKind,
         heads: impl Into<ColumnHeads>,
@@ -253,7 +255,8 @@ impl<T> TableBuilder<T> {
     }
 
     /// Groups the rows by the headings of their items.
-    pub(crate) fn group(mut self, heading: impl Fn(&T) -> Option<String>) -> Self {
+    #[must_use]
+    pub fn group(mut self, heading: impl Fn(&T) -> Option<String>) -> Self {
         for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
             row.group = heading(item);
         }
@@ -261,13 +264,15 @@ impl<T> TableBuilder<T> {
     }
 
     /// Sets the footnote that explains the marks.
-    pub(crate) fn foot(mut self, foot: Option<String>) -> Self {
+    #[must_use]
+    pub fn foot(mut self, foot: Option<String>) -> Self {
         self.table.foot = foot;
         self
     }
 
     /// Hides the rows of some items in a format.
-    pub(crate) fn hide(mut self, format: TableFormat, is_hidden: impl Fn(&T) -> bool) -> Self {
+    #[must_use]
+    pub fn hide(mut self, format: TableFormat, is_hidden: impl Fn(&T) -> bool) -> Self {
         for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
             if is_hidden(item) {
                 row.hidden_in.push(format);
@@ -277,25 +282,27 @@ impl<T> TableBuilder<T> {
     }
 
     /// The table with all its columns.
-    pub(crate) fn build(self) -> Table {
+    pub fn build(self) -> Table {
         self.table
     }
 }
 
 impl Table {
     /// Restricts the table to its CSV file: it is not printed, nor shown on the page or in LaTeX.
-    pub(crate) fn in_files_only(mut self) -> Self {
+    #[must_use]
+    pub fn in_files_only(mut self) -> Self {
         (self.section, self.heading, self.latex) = ("", None, None);
         self
     }
 
     /// True if the table is written to a CSV file.
-    pub(crate) fn has_file(&self) -> bool {
+    pub fn has_file(&self) -> bool {
         self.columns.iter().any(|column| !column.heads.csv.is_empty())
     }
 
     /// Removes the CSV columns, so that the table is not written to a file.
-    pub(crate) fn without_file(mut self) -> Self {
+    #[must_use]
+    pub fn without_file(mut self) -> Self {
         for column in &mut self.columns {
             column.heads.csv.clear();
         }
@@ -303,13 +310,13 @@ impl Table {
     }
 
     /// The rows that a format shows.
-    pub(crate) fn rows_in(&self, format: TableFormat) -> impl Iterator<Item = &TableRow> {
+    pub fn rows_in(&self, format: TableFormat) -> impl Iterator<Item = &TableRow> {
         self.rows.iter().filter(move |row| !row.hidden_in.contains(&format))
     }
 
     /// The rows that a format shows. The first row of a group has its heading, and the first row after a group an empty
     /// heading; all other rows have `None`.
-    pub(crate) fn headed_rows_in(&self, format: TableFormat) -> impl Iterator<Item = (Option<&str>, &TableRow)> {
+    pub fn headed_rows_in(&self, format: TableFormat) -> impl Iterator<Item = (Option<&str>, &TableRow)> {
         let mut above: Option<&str> = None;
         self.rows_in(format).map(move |row| {
             let group = row.group.as_deref();
@@ -320,7 +327,7 @@ impl Table {
     }
 
     /// The cells of a row with their columns.
-    pub(crate) fn cells<'t>(&'t self, row: &'t TableRow) -> impl Iterator<Item = (&'t Column, &'t TableCell)> + Clone {
+    pub fn cells<'t>(&'t self, row: &'t TableRow) -> impl Iterator<Item = (&'t Column, &'t TableCell)> + Clone {
         self.columns.iter().zip(&row.cells)
     }
 }
@@ -328,7 +335,7 @@ impl Table {
 /// One field of a row. Numbers have enough digits to be parsed without loss.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(untagged)]
-pub(crate) enum CsvField<'a> {
+pub enum CsvField<'a> {
     None,
     Text(&'a str),
     Count(usize),
@@ -345,7 +352,7 @@ fn plain<S: Serializer>(number: &f64, serializer: S) -> Result<S::Ok, S::Error> 
 }
 
 /// The fields of a cell, one for each of the `names` CSV names of its column.
-pub(crate) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = CsvField<'_>> {
+pub fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = CsvField<'_>> {
     let mut fields = [CsvField::None; 4];
     match cell {
         TableCell::Blank | TableCell::Absent | TableCell::Missing | TableCell::Unknown(_) => {}
@@ -404,7 +411,7 @@ fn is_number(text: &str) -> bool {
 ///
 /// # Errors
 /// If one cannot be written.
-pub(crate) fn files(tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
+pub fn files(tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
     let mut files = Vec::new();
     for parts in tables.chunk_by(|table, next| table.name == next.name) {
         let table = csv(parts)?;
@@ -420,7 +427,7 @@ pub(crate) fn files(tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
 ///
 /// # Errors
 /// If the file cannot be written.
-pub(crate) fn csv(parts: &[Table]) -> Result<Vec<u8>> {
+pub fn csv(parts: &[Table]) -> Result<Vec<u8>> {
     let mut file = Vec::new();
     write(&mut file, parts)?;
     Ok(file)
@@ -430,7 +437,7 @@ pub(crate) fn csv(parts: &[Table]) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// If they cannot be written.
-pub(crate) fn write<T: Borrow<Table>>(out: impl Write, parts: impl IntoIterator<Item = T>) -> Result<()> {
+pub fn write<T: Borrow<Table>>(out: impl Write, parts: impl IntoIterator<Item = T>) -> Result<()> {
     let mut file = ::csv::Writer::from_writer(out);
     let mut has_header = false;
     for table in parts {

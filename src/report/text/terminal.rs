@@ -19,18 +19,18 @@ use serde::Serialize;
 use unicode_width::UnicodeWidthStr;
 
 use super::words::shorten_middle;
-use crate::error::{Error, Result};
-use crate::report::text::table::{Column, ColumnKind, Table, TableCell, TableFormat};
-use crate::report::text::words::{interval, percent, points, reach, stops, widest_reach_of, with_interval, words};
-use crate::types::text::escape_hidden;
+use crate::text::table::{Column, ColumnKind, Table, TableCell, TableFormat};
+use crate::text::words::{interval, percent, points, reach, stops, widest_reach_of, with_interval, words};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::text::escape_hidden;
 
 /// The lenient number in brackets, ` (LENIENT)`, if it differs from the strict one; otherwise empty.
-pub(crate) fn differing(strict: &str, lenient: &str) -> String {
+pub fn differing(strict: &str, lenient: &str) -> String {
     if strict == lenient { String::new() } else { format!(" ({lenient})") }
 }
 
 /// A cell as text for the terminal: one text for each name of its column.
-pub(crate) fn texts(kind: ColumnKind, cell: &TableCell) -> Vec<String> {
+pub fn texts(kind: ColumnKind, cell: &TableCell) -> Vec<String> {
     match (kind, cell) {
         (ColumnKind::Points, TableCell::Estimate(e)) => {
             let interval = format!("{} to {}", points(e.low), points(e.high));
@@ -50,13 +50,13 @@ pub(crate) fn texts(kind: ColumnKind, cell: &TableCell) -> Vec<String> {
 }
 
 /// Wraps a text at the width of the terminal. The first line begins with `first`, the others with `rest`.
-pub(crate) fn line(first: &str, text: &str, rest: &str) -> String {
+pub fn line(first: &str, text: &str, rest: &str) -> String {
     wrapped_to(terminal_columns(), first, text, rest)
 }
 
 /// All tables that have a heading, each with its heading and notes.
 #[must_use]
-pub(crate) fn render(tables: &[Table]) -> String {
+pub fn render(tables: &[Table]) -> String {
     let mut text = String::new();
     for parts in tables.chunk_by(|table, next| (table.name, &table.heading) == (next.name, &next.heading)) {
         let Some(heading) = &parts[0].heading else {
@@ -81,7 +81,7 @@ const REACH: &str = "95 %";
 /// Formats tables with the same columns as one table; empty without rows. A table of accuracies has a last column with
 /// the widest interval of each row.
 #[must_use]
-pub(crate) fn table(parts: &[Table]) -> String {
+pub fn table(parts: &[Table]) -> String {
     let columns = parts.iter().take(1).flat_map(|table| &table.columns);
     let has_reach = columns.clone().any(|column| column.kind == ColumnKind::Accuracy);
     let heads = columns.flat_map(|Column { kind, heads }| {
@@ -342,7 +342,7 @@ const MIN: usize = 60;
 
 /// The width of the output in columns: the variable `COLUMNS`, otherwise the width of the terminal, otherwise 80; at
 /// least 60.
-pub(crate) fn terminal_columns() -> usize {
+pub fn terminal_columns() -> usize {
     std::env::var("COLUMNS")
         .ok()
         .and_then(|columns| columns.trim().parse().ok())
@@ -356,18 +356,18 @@ pub(crate) fn terminal_columns() -> usize {
 ///
 /// # Errors
 /// If the value cannot be serialized.
-pub(crate) fn to_script_json<T: Serialize>(value: &T) -> Result<String> {
+pub fn to_script_json<T: Serialize>(value: &T) -> Result<String> {
     let text = serde_json::to_string(value).map_err(|e| Error::data("page", e))?;
     // In JSON, `<` occurs only inside strings.
     Ok(text.replace('<', "\\u003c"))
 }
 
 /// Maximum width of a line in characters.
-pub(crate) const WIDTH: usize = 80;
+pub const WIDTH: usize = 80;
 
 /// Wraps a text at [`WIDTH`] characters, or at the width of a narrower terminal. The first line begins with `first`,
 /// the others with `rest`.
-pub(crate) fn wrapped(first: &str, text: &str, rest: &str) -> String {
+pub fn wrapped(first: &str, text: &str, rest: &str) -> String {
     wrapped_to(WIDTH.min(terminal_columns()), first, text, rest)
 }
 
@@ -398,7 +398,7 @@ const MAX_CHARS: usize = 4_000;
 /// Escapes hidden characters as codes such as ⟨U+202E⟩, and cuts a text of more than [`MAX_CHARS`] characters, with a
 /// note at its end.
 #[must_use]
-pub(crate) fn readable(text: &str) -> String {
+pub fn readable(text: &str) -> String {
     let cut = text.char_indices().nth(MAX_CHARS);
     let kept = cut.map_or(text, |(at, _)| &text[..at]);
     let mut visible = escape_hidden(kept).into_owned();

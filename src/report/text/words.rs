@@ -11,9 +11,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
-use crate::report::text::table::{ColumnKind, TableCell};
-use crate::types::text::counted;
-use crate::types::{
+use crate::text::table::{ColumnKind, TableCell};
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{
     EnhancerName, FailureKind, Family, FrameId, ProfileName, Record, SentImages, TrialOutcome, UnreadReason, Variant,
 };
 use darkqa_score::estimate::Estimate;
@@ -22,13 +22,13 @@ use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::significance::ALPHA;
 
 /// Title of a variant and its enhancer, such as `with noise + lift`.
-pub(crate) fn light(variant: &Variant, enhancer: Option<&EnhancerName>) -> String {
+pub fn light(variant: &Variant, enhancer: Option<&EnhancerName>) -> String {
     light_with(variant, enhancer.map(EnhancerName::as_str))
 }
 
 /// Title of a variant and its enhancer, like [`light`], with a display name for the enhancer. A group of runs is
 /// appended.
-pub(crate) fn light_with(variant: &Variant, enhancer: Option<&str>) -> String {
+pub fn light_with(variant: &Variant, enhancer: Option<&str>) -> String {
     let (title, group) = (variant.title(), variant.group_suffix());
     match enhancer {
         None => title + &group,
@@ -37,22 +37,22 @@ pub(crate) fn light_with(variant: &Variant, enhancer: Option<&str>) -> String {
 }
 
 /// Display name of a question family; `None` is all families.
-pub(crate) fn family(family: Option<&Family>) -> &str {
+pub fn family(family: Option<&Family>) -> &str {
     family.map_or("all families", Family::title)
 }
 
 /// Display name of a subject: its model and condition.
-pub(crate) fn name(subject: &ModelInCondition) -> String {
+pub fn name(subject: &ModelInCondition) -> String {
     format!("{} {}", subject.model, subject.condition())
 }
 
 /// Name of a model in figures and LaTeX tables, which is marked if it is a reference beside models under test.
-pub(crate) fn marked_reference(name: String, is_reference: bool) -> String {
+pub fn marked_reference(name: String, is_reference: bool) -> String {
     if is_reference { format!("{name} (reference)") } else { name }
 }
 
 /// Shortens a name to `width` characters by replacing its middle with `…`. Shorter names are unchanged.
-pub(crate) fn shorten_middle(name: &str, width: usize) -> String {
+pub fn shorten_middle(name: &str, width: usize) -> String {
     let chars: Vec<char> = name.chars().collect();
     if chars.len() <= width {
         return name.to_owned();
@@ -63,7 +63,7 @@ pub(crate) fn shorten_middle(name: &str, width: usize) -> String {
 }
 
 /// A share (0 to 1) in percent, with one decimal and no percent sign.
-pub(crate) fn percent(share: f64) -> String {
+pub fn percent(share: f64) -> String {
     let text = format!("{:.1}", 100.0 * share);
     match &*text {
         "-0.0" => "0.0".to_owned(),
@@ -73,7 +73,7 @@ pub(crate) fn percent(share: f64) -> String {
 
 /// The ends of the interval of a share in percent, with one decimal, or as many as it takes to print an interval that
 /// has a width.
-pub(crate) fn share_ends(low: f64, high: f64) -> [String; 2] {
+pub fn share_ends(low: f64, high: f64) -> [String; 2] {
     let decimals = share_decimals(low, high);
     [low, high].map(|end| match decimals {
         1 => percent(end),
@@ -83,7 +83,7 @@ pub(crate) fn share_ends(low: f64, high: f64) -> [String; 2] {
 
 /// Number of decimals with which the ends of an interval of a share, in percent, differ; 1 for an interval without a
 /// width.
-pub(crate) fn share_decimals(low: f64, high: f64) -> usize {
+pub fn share_decimals(low: f64, high: f64) -> usize {
     (1..MAX_SHARE_DECIMALS)
         .find(|decimals| {
             let [low, high] = [low, high].map(|end| format!("{:.decimals$}", 100.0 * end));
@@ -96,12 +96,12 @@ pub(crate) fn share_decimals(low: f64, high: f64) -> usize {
 const MAX_SHARE_DECIMALS: usize = 6;
 
 /// True if a condition (`L3-noise+lift`) or the title of a variant (`with noise + lift`) names this enhancer.
-pub(crate) fn names_enhancer(text: &str, enhancer: &str) -> bool {
+pub fn names_enhancer(text: &str, enhancer: &str) -> bool {
     text.split([' ', '+']).any(|word| word == enhancer)
 }
 
 /// A difference of shares (−1 to 1) in percentage points, with its sign and one decimal; zero has no sign.
-pub(crate) fn points(difference: f64) -> String {
+pub fn points(difference: f64) -> String {
     let text = format!("{:+.1}", 100.0 * difference);
     match &*text {
         "+0.0" | "-0.0" => "0.0".to_owned(),
@@ -110,13 +110,13 @@ pub(crate) fn points(difference: f64) -> String {
 }
 
 /// Interval of a difference in percentage points, such as `−1.2, +5.0`.
-pub(crate) fn ends_in_points(difference: Estimate) -> String {
+pub fn ends_in_points(difference: Estimate) -> String {
     format!("{}, {}", points(difference.low), points(difference.high))
 }
 
 /// A p-value with three decimals, or `< 0.001`. A value below 0.05 has as many decimals as it takes to stay below 0.05,
 /// because a result is detected if and only if p is below 0.05.
-pub(crate) fn p(value: f64) -> String {
+pub fn p(value: f64) -> String {
     if value < 0.001 {
         return "< 0.001".to_owned();
     }
@@ -134,22 +134,22 @@ const MAX_P_DECIMALS: usize = 7;
 
 /// Interval of an exposure drop in EV, such as `1.2 to 3.4`; `–` if the lower end is infinite (beyond the darkest
 /// level).
-pub(crate) fn reach(low: f64, high: f64, darkest: f64) -> String {
+pub fn reach(low: f64, high: f64, darkest: f64) -> String {
     if low.is_infinite() { "–".to_owned() } else { format!("{} to {}", stops(low, darkest), stops(high, darkest)) }
 }
 
 /// An exposure drop in EV with one decimal. An infinite drop is `>` and the drop of the darkest level asked, in EV.
-pub(crate) fn stops(value: f64, darkest: f64) -> String {
+pub fn stops(value: f64, darkest: f64) -> String {
     if value.is_infinite() { format!("> {darkest}") } else { format!("{value:.1}") }
 }
 
 /// Light in lux at an exposure drop in EV below `at_l0`: each EV halves it.
-pub(crate) fn lux_at(at_l0: f64, drop: f64) -> f64 {
+pub fn lux_at(at_l0: f64, drop: f64) -> f64 {
     at_l0 * (-drop).exp2()
 }
 
 /// Light as from [`lux_at`], to two significant digits: `180`, `5.4`, `0.39`.
-pub(crate) fn lux(at_l0: f64, drop: f64) -> String {
+pub fn lux(at_l0: f64, drop: f64) -> String {
     let light = lux_at(at_l0, drop);
     let digits = 1 - light.log10().floor() as i32;
     let step = 10_f64.powi(-digits);
@@ -158,7 +158,7 @@ pub(crate) fn lux(at_l0: f64, drop: f64) -> String {
 
 /// A share in percent with its interval, such as `96.4 [93.0, 98.2]`; without an interval if the share is known
 /// exactly.
-pub(crate) fn with_interval(share: Estimate) -> String {
+pub fn with_interval(share: Estimate) -> String {
     let value = percent(share.value);
     if share.high <= share.low {
         return value;
@@ -169,7 +169,7 @@ pub(crate) fn with_interval(share: Estimate) -> String {
 
 /// Estimate of a cell that [`words`] formats without its interval: an accuracy, a score or an effect. `None` for other
 /// cells.
-pub(crate) fn interval(kind: ColumnKind, cell: &TableCell) -> Option<Estimate> {
+pub fn interval(kind: ColumnKind, cell: &TableCell) -> Option<Estimate> {
     match (kind, cell) {
         (
             _,
@@ -185,7 +185,7 @@ pub(crate) fn interval(kind: ColumnKind, cell: &TableCell) -> Option<Estimate> {
 
 /// Largest lower and upper error bars of several estimates, in percentage points, such as `−7.7 +7.1`; empty without
 /// estimates.
-pub(crate) fn widest_reach_of(shares: impl Iterator<Item = Estimate>) -> String {
+pub fn widest_reach_of(shares: impl Iterator<Item = Estimate>) -> String {
     shares
         .map(|share| [share.value - share.low, share.high - share.value])
         .fold(None, |widest: Option<[f64; 2]>, [down, up]| {
@@ -199,13 +199,13 @@ pub(crate) fn widest_reach_of(shares: impl Iterator<Item = Estimate>) -> String 
 }
 
 /// Interval of a share in percent, such as `93.0–98.2`.
-pub(crate) fn ends(share: Estimate) -> String {
+pub fn ends(share: Estimate) -> String {
     let [low, high] = share_ends(share.low, share.high);
     format!("{low}–{high}")
 }
 
 /// Formats a table cell, by the kind of its column.
-pub(crate) fn words(kind: ColumnKind, cell: &TableCell) -> String {
+pub fn words(kind: ColumnKind, cell: &TableCell) -> String {
     match cell {
         TableCell::Blank | TableCell::Absent => String::new(),
         TableCell::Missing => "–".to_owned(),
@@ -248,7 +248,7 @@ fn format_estimate(kind: ColumnKind, estimate: Estimate) -> String {
 }
 
 /// Lists up to `most` names and the number of the remaining ones: `a, b and 3 more`.
-pub(crate) fn first_names<S: AsRef<str>>(names: &[S], most: usize) -> String {
+pub fn first_names<S: AsRef<str>>(names: &[S], most: usize) -> String {
     let (first, others) = names.split_at(names.len().min(most));
     let first = first.iter().map(AsRef::as_ref).collect::<Vec<_>>().join(", ");
     match others.len() {
@@ -259,7 +259,7 @@ pub(crate) fn first_names<S: AsRef<str>>(names: &[S], most: usize) -> String {
 
 /// The outcome of a trial of a question with choices, by the strict parsing: `✓ right`, `not read (cut at the token
 /// limit)`.
-pub(crate) fn outcome(record: &Record) -> String {
+pub fn outcome(record: &Record) -> String {
     match record.detail.outcome {
         TrialOutcome::Right => "✓ right".to_owned(),
         TrialOutcome::Wrong => "✗ wrong".to_owned(),
@@ -277,7 +277,7 @@ pub(crate) fn outcome(record: &Record) -> String {
 }
 
 /// The reason in words why the strict parsing found no choice in a reply.
-pub(crate) fn unread_reason(why: UnreadReason) -> &'static str {
+pub fn unread_reason(why: UnreadReason) -> &'static str {
     match why {
         UnreadReason::Empty => "the reply is empty",
         UnreadReason::Refused => "the model refused",
@@ -293,7 +293,7 @@ pub(crate) fn unread_reason(why: UnreadReason) -> &'static str {
 }
 
 /// The reason in words why no reply came, with the HTTP status if the server sent one.
-pub(crate) fn failure_reason(kind: FailureKind, status: Option<u16>) -> String {
+pub fn failure_reason(kind: FailureKind, status: Option<u16>) -> String {
     let kind = match kind {
         FailureKind::Connection => "no connection",
         FailureKind::Timeout => "no whole reply in time",
@@ -312,7 +312,7 @@ pub(crate) fn failure_reason(kind: FailureKind, status: Option<u16>) -> String {
 
 /// The number of frames that were asked about, as `3 frames (2 of 2 to 4 images)` if some questions show several
 /// images.
-pub(crate) fn frames(grid: &Grid<'_>) -> String {
+pub fn frames(grid: &Grid<'_>) -> String {
     let mut images = BTreeMap::<&FrameId, usize>::new();
     for (place, item) in grid.items.iter().enumerate() {
         let counts = (0..grid.subjects.len())
@@ -337,16 +337,16 @@ pub(crate) fn frames(grid: &Grid<'_>) -> String {
 /// The noise profiles of the subjects with noise, `paper` first.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(transparent)]
-pub(crate) struct ProfileNames(BTreeSet<ProfileName>);
+pub struct ProfileNames(BTreeSet<ProfileName>);
 
 impl ProfileNames {
-    pub(crate) fn new<'s>(subjects: impl IntoIterator<Item = &'s ModelInCondition>) -> Self {
+    pub fn new<'s>(subjects: impl IntoIterator<Item = &'s ModelInCondition>) -> Self {
         Self(subjects.into_iter().filter_map(|subject| subject.variant.reading.clone()).collect())
     }
 
     /// A note that other noise profiles were not run, with the flags to run them; `None` without noise or with several
     /// noise profiles.
-    pub(crate) fn open_question(&self) -> Option<String> {
+    pub fn open_question(&self) -> Option<String> {
         let mut readings = self.0.iter();
         let (Some(only), None) = (readings.next(), readings.next()) else {
             return None;
@@ -361,7 +361,7 @@ impl ProfileNames {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::Condition;
+    use darkqa_base::types::Condition;
 
     #[test]
     fn zero_percent_has_no_sign() {

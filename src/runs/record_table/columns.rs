@@ -9,20 +9,20 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::reader::{RecordRow, SentImage, TableDetail};
-use crate::error::Result;
-use crate::runs::mark_index::{JUDGE, MarkIndex, PROTOCOL};
-use crate::runs::predictions::{AnswerState, answer_state};
-use crate::runs::stored::text_setting;
-use crate::store::CellKind::{self, Bool, Digest, Double, Int8, Int16, Int32, Key, LongText, Text};
-use crate::store::Presence::{self, Always, MayBeNull};
-use crate::store::{Cell, Column, each_record};
-use crate::types::flags::read_word;
-use crate::types::manifests::{RecordedNames, RunManifest};
-use crate::types::{
+use crate::mark_index::{JUDGE, MarkIndex, PROTOCOL};
+use crate::predictions::{AnswerState, answer_state};
+use crate::stored::text_setting;
+use darkqa_base::error::Result;
+use darkqa_base::types::flags::read_word;
+use darkqa_base::types::manifests::{RecordedNames, RunManifest};
+use darkqa_base::types::{
     ChoiceDetail, Condition, Failure, Finish, OpenDetail, ParsedAnswer, Record, RunQuestion, Step, Usage,
 };
 use darkqa_score::choice::llm_match::{Protocol, mark};
 use darkqa_score::open::AnswerOutcome;
+use darkqa_store::CellKind::{self, Bool, Digest, Double, Int8, Int16, Int32, Key, LongText, Text};
+use darkqa_store::Presence::{self, Always, MayBeNull};
+use darkqa_store::{Cell, Column, each_record};
 
 pub(super) fn column<R>(
     name: &'static str,

@@ -6,23 +6,23 @@ mod reader;
 
 use std::path::Path;
 
-use crate::error::Result;
-use crate::runs::outcome::RecordTable;
-use crate::runs::stored::ExperimentKind;
-use crate::store::{CREATED_BY, ColumnFile, FileMetadata, LogMark};
-use crate::types::{ChoiceDetail, OpenDetail};
+use crate::outcome::RecordTable;
+use crate::stored::ExperimentKind;
+use darkqa_base::error::Result;
+use darkqa_base::types::{ChoiceDetail, OpenDetail};
+use darkqa_store::{CREATED_BY, ColumnFile, FileMetadata, LogMark};
 use reader::{RowBatches, TableDetail};
 
 pub use self::reader::{Records, RunRecord, StoredRun};
 
-pub(crate) const RECORDS_PARQUET: &str = "records.parquet";
+pub const RECORDS_PARQUET: &str = "records.parquet";
 
 /// Writes the table of the run in a folder, unless the existing one is up to date with the log. The records are not
 /// kept in memory.
 ///
 /// # Errors
 /// If a record is broken, or the file cannot be written.
-pub(crate) fn update(folder: &Path, table: RecordTable) -> Result<()> {
+pub fn update(folder: &Path, table: RecordTable) -> Result<()> {
     match ExperimentKind::read(folder)? {
         ExperimentKind::Choice => update_kind::<ChoiceDetail>(folder, table),
         ExperimentKind::Open => update_kind::<OpenDetail>(folder, table),

@@ -15,17 +15,17 @@ use std::vec;
 
 use rayon::prelude::*;
 
-use crate::error::{Error, Result};
-use crate::runs::renamed::rename_record;
-use crate::runs::stored::{ExperimentKind, read_run_manifest};
-use crate::store::{Cell, CellKind, Column, LinePlace, RecordLog, each_question, each_trial};
-use crate::types::manifests::{RecordedNames, RunManifest};
-use crate::types::text::suggestion;
-use crate::types::{
+use crate::renamed::rename_record;
+use crate::stored::{ExperimentKind, read_run_manifest};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::{RecordedNames, RunManifest};
+use darkqa_base::types::text::suggestion;
+use darkqa_base::types::{
     ChoiceDetail, Condition, ConditionColumns, Digest, ModelListing, OpenDetail, QuestionId, Record, RunQuestion,
     Severity, TrialKey,
 };
 use darkqa_score::answers::record::Detail;
+use darkqa_store::{Cell, CellKind, Column, LinePlace, RecordLog, each_question, each_trial};
 
 /// A run folder, of questions with choices or of open questions.
 #[derive(Debug)]
@@ -282,7 +282,7 @@ struct RecordPlace {
     line: LinePlace,
 }
 
-/// The place of the last record of each trial, in the order of [`sort_trials`](crate::runs::stored::sort_trials).
+/// The place of the last record of each trial, in the order of [`sort_trials`](crate::stored::sort_trials).
 ///
 /// # Errors
 /// If a line is not a record.

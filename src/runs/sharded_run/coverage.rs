@@ -10,12 +10,12 @@ use std::num::NonZeroU32;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
-use crate::runs::run_plan::RunPlan;
-use crate::runs::shard::Shard;
-use crate::runs::stored::read_run_manifest;
-use crate::types::manifests::{RunManifest, RunPart, Status};
-use crate::types::text::counted;
+use crate::run_plan::RunPlan;
+use crate::shard::Shard;
+use crate::stored::read_run_manifest;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::manifests::{RunManifest, RunPart, Status};
+use darkqa_base::types::text::counted;
 
 /// The sources (frames or walks) of a run that are in some shard. The shards may come from several divisions.
 pub(super) struct Coverage {
@@ -147,7 +147,7 @@ impl Coverage {
 
 /// Treatment of sources of a run that are in no shard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum MissingShards {
+pub enum MissingShards {
     /// Return an error.
     Refuse,
     /// Print a warning, and leave these sources out.

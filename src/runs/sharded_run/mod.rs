@@ -15,28 +15,28 @@ use std::path::{Path, PathBuf};
 
 use super::shard::{ShardBudget, remove_tasks_setting};
 use super::shard_records::ShardLogs;
-use crate::error::{Error, Result};
-use crate::runs::shard_records::read_shard;
-use crate::runs::stored::sort_trials;
-use crate::store::{LinePlace, QuestionFile, Store, each_placed_question};
-use crate::types::flags::setting_spelling;
-use crate::types::manifests::{Counts, RunManifest, Status, differences};
-use crate::types::{FrameId, InputSummary, KeptTrial, QuestionId, Record, RunQuestion, TrialRef, Trials};
+use crate::shard_records::read_shard;
+use crate::stored::sort_trials;
 use coverage::{Coverage, StoredShard, no_shard_error};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::flags::setting_spelling;
+use darkqa_base::types::manifests::{Counts, RunManifest, Status, differences};
+use darkqa_base::types::{FrameId, InputSummary, KeptTrial, QuestionId, Record, RunQuestion, TrialRef, Trials};
 use darkqa_score::answers::record::Detail;
+use darkqa_store::{LinePlace, QuestionFile, Store, each_placed_question};
 
-pub(crate) use coverage::MissingShards;
-pub(crate) use open::{common_kind, open_any_run, open_choice_run, run_folders_in};
+pub use coverage::MissingShards;
+pub use open::{common_kind, open_any_run, open_choice_run, run_folders_in};
 
 /// The shards of one run, which may come from several divisions of it.
-pub(crate) struct ShardedRun<D: Detail> {
+pub struct ShardedRun<D: Detail> {
     shards: Vec<StoredShard>,
-    pub(crate) questions: ShardQuestions,
+    pub questions: ShardQuestions,
     /// Distinct trials, in the order of questions, conditions and models. The file number of a text is the index of its
     /// shard.
-    pub(crate) trials: Trials<D>,
+    pub trials: Trials<D>,
     /// The manifest of the whole run.
-    pub(crate) manifest: RunManifest,
+    pub manifest: RunManifest,
 }
 
 impl<D: Detail> ShardedRun<D> {
@@ -45,7 +45,7 @@ impl<D: Detail> ShardedRun<D> {
     /// # Errors
     /// If a folder has no shard, the shards belong to different runs, the same trial has different images in two
     /// shards, or sources are in no shard and `missing` is [`MissingShards::Refuse`].
-    pub(crate) fn read(folders: &[PathBuf], missing: MissingShards) -> Result<Self> {
+    pub fn read(folders: &[PathBuf], missing: MissingShards) -> Result<Self> {
         let mut shards: Vec<StoredShard> =
             folders.iter().map(|folder| StoredShard::open(folder)).collect::<Result<_>>()?;
         shards.sort_by_key(|shard| (shard.shard.count(), shard.shard));
@@ -82,23 +82,23 @@ impl<D: Detail> ShardedRun<D> {
     }
 
     /// The folder of each shard.
-    pub(crate) fn folders(&self) -> Vec<&Path> {
+    pub fn folders(&self) -> Vec<&Path> {
         self.shards.iter().map(|shard| &*shard.folder).collect()
     }
 
     /// The manifest of the whole run; frees everything else.
-    pub(crate) fn into_manifest(self) -> RunManifest {
+    pub fn into_manifest(self) -> RunManifest {
         self.manifest
     }
 
     /// The folder and the manifest of each shard.
-    pub(crate) fn manifests(&self) -> Vec<(&Path, &RunManifest)> {
+    pub fn manifests(&self) -> Vec<(&Path, &RunManifest)> {
         self.shards.iter().map(|shard| (&*shard.folder, &shard.manifest)).collect()
     }
 }
 
 /// The distinct questions of several shards, in the order of the data.
-pub(crate) struct ShardQuestions(Vec<ShardQuestion>);
+pub struct ShardQuestions(Vec<ShardQuestion>);
 
 /// A question of a shard.
 struct ShardQuestion {
@@ -114,7 +114,7 @@ impl ShardQuestions {
     ///
     /// # Errors
     /// If a line is not a question.
-    pub(crate) fn read(folders: &[&Path]) -> Result<Self> {
+    pub fn read(folders: &[&Path]) -> Result<Self> {
         let mut questions = Vec::new();
         for (index, folder) in folders.iter().enumerate() {
             each_placed_question(folder, |question, line| {
@@ -128,17 +128,17 @@ impl ShardQuestions {
     }
 
     /// Names of the questions, in order.
-    pub(crate) fn ids(&self) -> impl Iterator<Item = &QuestionId> {
+    pub fn ids(&self) -> impl Iterator<Item = &QuestionId> {
         self.0.iter().map(|question| &question.question.id)
     }
 
     /// Frames of the questions, in order.
-    pub(crate) fn frames(&self) -> impl Iterator<Item = &FrameId> {
+    pub fn frames(&self) -> impl Iterator<Item = &FrameId> {
         self.0.iter().map(|question| &question.question.frame)
     }
 
     /// The questions without their evidence, in order.
-    pub(crate) fn into_questions(self) -> Vec<RunQuestion> {
+    pub fn into_questions(self) -> Vec<RunQuestion> {
         self.0.into_iter().map(|question| question.question).collect()
     }
 
@@ -146,7 +146,7 @@ impl ShardQuestions {
     ///
     /// # Errors
     /// If a line cannot be read or written.
-    pub(crate) fn write<D: Detail>(&self, store: &Store<D>, folders: &[&Path]) -> Result<()> {
+    pub fn write<D: Detail>(&self, store: &Store<D>, folders: &[&Path]) -> Result<()> {
         let files: Vec<Option<QuestionFile>> =
             folders.iter().map(|folder| QuestionFile::open(folder)).collect::<Result<_>>()?;
         store.write_question_lines(|out| {

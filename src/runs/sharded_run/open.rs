@@ -5,14 +5,13 @@ use std::path::{Path, PathBuf};
 
 use super::ShardedRun;
 use super::coverage::{MissingShards, no_shard_error};
-use crate::data::ready_made::is_zip_file;
-use crate::error::{Error, Result};
-use crate::runs::missing_thumbnails::MissingThumbnails;
-use crate::runs::run_texts::RunTexts;
-use crate::runs::stored::{AnyRun, ExperimentKind, RunLayout, StoredRun, open_questions_error, read_run_manifest};
-use crate::runs::zipped_run::open_zip;
-use crate::store;
-use crate::types::{ChoiceDetail, Trials};
+use crate::missing_thumbnails::MissingThumbnails;
+use crate::run_texts::RunTexts;
+use crate::stored::{AnyRun, ExperimentKind, RunLayout, StoredRun, open_questions_error, read_run_manifest};
+use crate::zipped_run::open_zip;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::{ChoiceDetail, Trials};
+use darkqa_data::ready_made::is_zip_file;
 use darkqa_score::answers::record::Detail;
 
 /// Opens the run in a folder or a ZIP file. If the folder itself has no run, joins all shards in it, with a warning
@@ -20,7 +19,7 @@ use darkqa_score::answers::record::Detail;
 ///
 /// # Errors
 /// If the folder or the file has none, or the shards belong to different runs.
-pub(crate) fn open_any_run(folder: &Path) -> Result<AnyRun> {
+pub fn open_any_run(folder: &Path) -> Result<AnyRun> {
     if is_zip_file(folder) {
         return open_zip(folder);
     }
@@ -37,7 +36,7 @@ pub(crate) fn open_any_run(folder: &Path) -> Result<AnyRun> {
 ///
 /// # Errors
 /// Also if the questions are open. That error tells the user what to do `instead`.
-pub(crate) fn open_choice_run(folder: &Path, instead: &str) -> Result<StoredRun<ChoiceDetail>> {
+pub fn open_choice_run(folder: &Path, instead: &str) -> Result<StoredRun<ChoiceDetail>> {
     if is_zip_file(folder) {
         return match open_zip(folder)? {
             AnyRun::Choice(run) => Ok(run),
@@ -59,7 +58,7 @@ pub(crate) fn open_choice_run(folder: &Path, instead: &str) -> Result<StoredRun<
 /// If the manifest of one cannot be read.
 fn shard_folders_in(folder: &Path) -> Result<Option<Vec<PathBuf>>> {
     let is_folder = fs::metadata(folder).is_ok_and(|entry| entry.is_dir());
-    if !is_folder || store::schema(folder)?.is_some() {
+    if !is_folder || darkqa_store::schema(folder)?.is_some() {
         return Ok(None);
     }
     let runs = run_folders_in(folder)?;
@@ -81,8 +80,8 @@ fn run_from_shards<D: Detail>(folder: &Path, parts: &[PathBuf]) -> Result<Stored
         folder: folder.to_owned(),
         layout: RunLayout::Shards,
         texts: RunTexts::Shards(texts?),
-        thumbnails: store::missing_thumbnails(&[], &folders, |frame| wanted.wants(frame)),
-        fidelity: store::missing_fidelity(&[], &folders, |_| true),
+        thumbnails: darkqa_store::missing_thumbnails(&[], &folders, |frame| wanted.wants(frame)),
+        fidelity: darkqa_store::missing_fidelity(&[], &folders, |_| true),
         left_out: Trials::default(),
         manifest: parts.manifest,
         trials: parts.trials,
@@ -94,12 +93,12 @@ fn run_from_shards<D: Detail>(folder: &Path, parts: &[PathBuf]) -> Result<Stored
 ///
 /// # Errors
 /// If the folder or a manifest cannot be read.
-pub(crate) fn run_folders_in(folder: &Path) -> Result<Vec<PathBuf>> {
+pub fn run_folders_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
     let mut runs = Vec::new();
     for entry in entries {
         let path = entry.map_err(|e| Error::file(folder, "read", e))?.path();
-        if store::schema(&path)?.is_some() {
+        if darkqa_store::schema(&path)?.is_some() {
             runs.push(path);
         }
     }
@@ -111,7 +110,7 @@ pub(crate) fn run_folders_in(folder: &Path) -> Result<Vec<PathBuf>> {
 ///
 /// # Errors
 /// If there is no run, or the runs are of different kinds.
-pub(crate) fn common_kind(folders: &[PathBuf]) -> Result<ExperimentKind> {
+pub fn common_kind(folders: &[PathBuf]) -> Result<ExperimentKind> {
     let kinds: Vec<ExperimentKind> =
         folders.iter().map(|folder| ExperimentKind::read(folder)).collect::<Result<_>>()?;
     let first = *kinds.first().ok_or_else(no_shard_error)?;

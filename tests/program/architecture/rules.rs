@@ -43,9 +43,9 @@ pub(crate) fn crate_imports(files: &Files, map: &Map, aliases: &[(&str, &str)]) 
     for (source, part) in files.parts_outside_tests().filter(|(_, part)| part.is_path()) {
         let room = source.path.split('/').next().unwrap_or_default();
         let name = part.names.first().and_then(|name| name.strip_prefix("darkqa_"));
-        // The networks are data.
+        // Networks and prompts are data.
         if let Some(other) = name.map(|name| behind(name, aliases))
-            && other != "models"
+            && !matches!(other, "models" | "prompts")
             && !map.allows(room, other)
         {
             wrong.push(at(source, part.line, &format!("`{room}` may not use `{other}`")));
@@ -91,8 +91,8 @@ pub(crate) fn unfinished(files: &Files) -> Vec<String> {
 }
 
 /// Where a library is used outside of its places, and its places that do not use it; tests are free.
-pub(crate) fn library(files: &Files, name: &str, places: &[&str]) -> Vec<String> {
-    let uses = files.parts_outside_tests().filter(|(_, part)| {
+pub(crate) fn library<'a>(files: impl IntoIterator<Item = &'a Files>, name: &str, places: &[&str]) -> Vec<String> {
+    let uses = files.into_iter().flat_map(Files::parts_outside_tests).filter(|(_, part)| {
         let is_whole = part.names.len() > 1 || matches!(part.kind, Kind::Import { .. });
         part.is_path() && is_whole && part.names[0] == name
     });
@@ -101,7 +101,11 @@ pub(crate) fn library(files: &Files, name: &str, places: &[&str]) -> Vec<String>
 
 /// Where folders are listed or files are opened by the standard library in `readers`, outside of some files; and the
 /// places that do neither, or are folders, in which nothing would be checked. Tests are free.
-pub(crate) fn listings(files: &Files, readers: &[&str], places: &[&str]) -> Vec<String> {
+pub(crate) fn listings<'a>(
+    files: impl IntoIterator<Item = &'a Files>,
+    readers: &[&str],
+    places: &[&str],
+) -> Vec<String> {
     const WAYS: [[&str; 2]; 6] = [
         ["files", "entries"],
         ["fs", "read"],
@@ -110,7 +114,7 @@ pub(crate) fn listings(files: &Files, readers: &[&str], places: &[&str]) -> Vec<
         ["File", "open"],
         ["glob", "glob"],
     ];
-    let uses = files.parts_outside_tests().filter(|(source, part)| {
+    let uses = files.into_iter().flat_map(Files::parts_outside_tests).filter(|(source, part)| {
         let is_reader = readers.iter().any(|reader| {
             let rest = source.path.strip_prefix(reader);
             rest.is_some_and(|rest| rest.starts_with('/'))
@@ -125,8 +129,8 @@ pub(crate) fn listings(files: &Files, readers: &[&str], places: &[&str]) -> Vec<
 }
 
 /// Where a future is awaited outside of some places, and the places that await none; tests are free.
-pub(crate) fn awaits(files: &Files, places: &[&str]) -> Vec<String> {
-    let parts = files.parts_outside_tests();
+pub(crate) fn awaits<'a>(files: impl IntoIterator<Item = &'a Files>, places: &[&str]) -> Vec<String> {
+    let parts = files.into_iter().flat_map(Files::parts_outside_tests);
     let uses = parts.filter(|(_, part)| matches!(part.kind, Kind::Await));
     misplaced(&uses.collect::<Vec<_>>(), "`.await`", places)
 }

@@ -25,7 +25,7 @@ fn evaluate(bench: &Bench, model: &str, more: &str) -> Called {
         "--model {model} --data frames --levels L3,L5 --variant both --llie one.onnx --llie-on both --llie-anyway --timings {more}"
     );
     let mut command = bench.command(&words(&line));
-    let called = called(command.env("RUST_LOG", "darkqa_eval=debug"));
+    let called = called(command.env("RUST_LOG", "darkqa_engine=debug,darkqa_eval=warn"));
     assert_eq!(called.code, Some(0), "{line}: {called:?}");
     called
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::ask::requests::AdaptableField;
+use crate::requests::AdaptableField;
 
 fn new_balancer(count: usize) -> LoadBalancer {
     let all = LoadBalancer::new((0..count).map(|index| format!("r{index}")));

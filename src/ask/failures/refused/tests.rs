@@ -1,6 +1,6 @@
 use super::*;
-use crate::ask::failures::find_error;
-use crate::ask::requests::{Parameters, RequestFields, TokenField};
+use crate::failures::find_error;
+use crate::requests::{Parameters, RequestFields, TokenField};
 use serde_json::Value;
 use serde_json::json;
 

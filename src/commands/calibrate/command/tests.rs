@@ -2,7 +2,7 @@ use super::*;
 use crate::commands::calibrate::lines::NoiseKind;
 use crate::commands::calibrate::setting::{FigurePoints, FrameCounts};
 use crate::commands::calibrate::{Cfa, Measured};
-use crate::types::Digest;
+use darkqa_base::types::Digest;
 
 fn measured(value: f64) -> Measured {
     Measured { value, error: Some(0.001) }

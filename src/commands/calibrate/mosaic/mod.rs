@@ -20,10 +20,10 @@ use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::{PhotometricInterpretation, Tag};
 use tiff::{ColorType, TiffError};
 
-use crate::error::{Error, Result};
-use crate::files;
-use crate::pictures::raw_png::{RawPng, RawPngError, SampleForm};
-use crate::types::Digest;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::Digest;
+use darkqa_pictures::raw_png::{RawPng, RawPngError, SampleForm};
 
 /// Frame of a sensor: one number for each site.
 #[derive(Debug, Clone, PartialEq)]

@@ -17,8 +17,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::error::{Error, Result};
-use crate::files::{self, entries};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{self, entries};
 
 impl Recording {
     /// Finds the frames of a recording: from the list `frames.csv` if it exists, otherwise by the names of subfolders.

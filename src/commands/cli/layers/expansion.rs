@@ -11,8 +11,8 @@ use clap::{Arg, ArgAction, Command};
 use toml::Value;
 
 use crate::commands::cli::keyed::{name_of, with_value};
-use crate::error::{Error, Result};
-use crate::types::flags::{KEYED_FLAGS, KeyedFlag, KeyedSetting, flag_spelling};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::flags::{KEYED_FLAGS, KeyedFlag, KeyedSetting, flag_spelling};
 
 /// The keyed flags of a command, and the hidden flags that their keys set.
 pub(super) struct Expansion<'a>(pub(super) &'a Command);

@@ -8,9 +8,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use super::expansion::LayeredValue;
-use crate::ask::{BaseUrl, OPENAI_KEY, vendor_variables};
-use crate::error::{Error, Result};
-use crate::types::flags::flag_spelling;
+use darkqa_ask::{BaseUrl, OPENAI_KEY, vendor_variables};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::flags::flag_spelling;
 
 /// The flags that decide where requests go, or who may read them on their way.
 const ADDRESSES: [&str; 3] = ["base-url", "judge-base-url", "ca-file"];

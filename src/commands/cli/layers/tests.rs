@@ -7,7 +7,7 @@ use clap::CommandFactory as _;
 
 use super::*;
 use crate::commands::cli::{Cli, command};
-use crate::types::flags::flag_spelling;
+use darkqa_base::types::flags::flag_spelling;
 
 /// The command line, made once for all calls.
 static COMMAND: LazyLock<Command> = LazyLock::new(command::command);
@@ -194,12 +194,12 @@ fn a_group_without_words_has_its_default_values() {
         let matches = command.try_get_matches_from(["group"]).unwrap();
         format!("{:?}", A::from_arg_matches(&matches).unwrap())
     }
-    let sending = format!("{:?}", crate::ask::Sending::default());
-    assert_eq!(defaults::<crate::ask::Sending>(), sending);
-    let rooms = format!("{:?}", crate::rooms::Rooms::default());
-    assert_eq!(defaults::<crate::rooms::Rooms>(), rooms);
-    let parameters = crate::ask::Parameters::new(String::new());
-    assert_eq!(defaults::<crate::ask::Parameters>(), format!("{parameters:?}"));
+    let sending = format!("{:?}", darkqa_ask::Sending::default());
+    assert_eq!(defaults::<darkqa_ask::Sending>(), sending);
+    let rooms = format!("{:?}", darkqa_rooms::Rooms::default());
+    assert_eq!(defaults::<darkqa_rooms::Rooms>(), rooms);
+    let parameters = darkqa_ask::Parameters::new(String::new());
+    assert_eq!(defaults::<darkqa_ask::Parameters>(), format!("{parameters:?}"));
 }
 
 #[test]

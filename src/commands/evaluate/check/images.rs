@@ -7,13 +7,13 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::data::{Dataset, Picture, SkipBad};
-use crate::engine::dark_already::{DarkImages, advice};
-use crate::engine::images::frames::first_question_per_frame;
-use crate::engine::images::progress::Progress;
-use crate::error::Result;
-use crate::types::text::counted;
-use crate::types::{Digest, FrameId, InputNote, InputSummary, Question};
+use darkqa_base::error::Result;
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{Digest, FrameId, InputNote, InputSummary, Question};
+use darkqa_data::{Dataset, Picture, SkipBad};
+use darkqa_engine::dark_already::{DarkImages, advice};
+use darkqa_engine::images::frames::first_question_per_frame;
+use darkqa_engine::images::progress::Progress;
 use darkqa_enhance::brightness;
 
 /// Whether all pixels of images are decoded.

@@ -20,21 +20,21 @@ use super::estimate;
 use super::settings::EvaluateArgs;
 use super::setup::unnamed_scenes;
 use super::write_plan::power_forecast;
-use crate::ask::{PromptSet, Wording};
-use crate::data::{DataSource, Dataset, Picture};
-use crate::engine::dark_already::DarkImages;
-use crate::engine::images::enhancement::enhancers::{self, EnhancerModels, EnhancerRunArgs};
-use crate::engine::images::progress::Progress;
-use crate::engine::images::trials::{QuestionBank, check_used, open_data, rules, select};
-use crate::error::{Error, Result};
-use crate::files::write;
-use crate::report::text::words::first_names;
-use crate::runs::Outcome;
-use crate::types::questions::letter;
-use crate::types::text::{counted, excerpt};
-use crate::types::{Decides, Question, Rgb};
+use darkqa_ask::{PromptSet, Wording};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::write;
+use darkqa_base::types::questions::letter;
+use darkqa_base::types::text::{counted, excerpt};
+use darkqa_base::types::{Decides, Question, Rgb};
+use darkqa_data::{DataSource, Dataset, Picture};
+use darkqa_engine::dark_already::DarkImages;
+use darkqa_engine::images::enhancement::enhancers::{self, EnhancerModels, EnhancerRunArgs};
+use darkqa_engine::images::progress::Progress;
+use darkqa_engine::images::trials::{QuestionBank, check_used, open_data, rules, select};
 use darkqa_enhance::{Install, RuntimeSearch};
 use darkqa_light::LightSettings;
+use darkqa_report::text::words::first_names;
+use darkqa_runs::Outcome;
 use darkqa_score::accuracies::MAX_ANSWER_SHARE;
 use darkqa_score::tested_sentences::RunContents;
 use images::{Depth, FindingSeverity, ImageFinding, ImageFindings, lines};
@@ -43,7 +43,7 @@ use images::{Depth, FindingSeverity, ImageFinding, ImageFindings, lines};
 #[derive(Debug, Clone, Args)]
 pub(crate) struct CheckArgs {
     /// The data, in place of --data; default: --data
-    #[arg(value_name = "DATA", value_parser = crate::data::parse_data_source, add = Decides::Nothing)]
+    #[arg(value_name = "DATA", value_parser = darkqa_data::parse_data_source, add = Decides::Nothing)]
     pub place: Option<DataSource>,
     /// Decode every image, so that damage inside a file is found; one that ends early is found without
     #[arg(long, help_heading = "Check", add = Decides::Nothing)]

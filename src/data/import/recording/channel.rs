@@ -5,20 +5,20 @@
 use std::iter::successors;
 
 use super::exposure::{Encoding, ExposureFields};
-use crate::types::text::excerpt;
+use darkqa_base::types::text::excerpt;
 
 /// Channel of a recording.
 #[derive(Debug, Clone)]
-pub(crate) struct Channel {
-    pub(crate) topic: String,
+pub struct Channel {
+    pub topic: String,
     /// Name of the message type without `msg/`, such as `sensor_msgs/Image` or `foxglove.RawImage`.
-    pub(crate) schema: String,
-    pub(crate) content: ChannelContent,
+    pub schema: String,
+    pub content: ChannelContent,
 }
 
 /// Kind of a channel's messages.
 #[derive(Debug, Clone)]
-pub(crate) enum ChannelContent {
+pub enum ChannelContent {
     /// Images.
     Image(Encoding),
     /// Intrinsics of a camera.
@@ -75,7 +75,7 @@ impl Channel {
 
 /// Common prefix of the topics of one camera: `/front` for `/front/image_raw`, `/front/image_raw/compressed` and
 /// `/front/camera_info`.
-pub(crate) fn camera_name(topic: &str) -> &str {
+pub fn camera_name(topic: &str) -> &str {
     let transports = ["/compressed", "/compressedDepth", "/theora", "/zstd", "/raw"];
     let base = transports
         .iter()
@@ -88,7 +88,7 @@ pub(crate) fn camera_name(topic: &str) -> &str {
 /// Names under which the intrinsics of an image topic may be found: first its camera, then each folder from the topic's
 /// own up to the one beside `image` or `image_…`, such as `…/Color_0` for RealSense's
 /// `…/Color_0/image/data/compressed`.
-pub(crate) fn intrinsics_names(topic: &str) -> Vec<&str> {
+pub fn intrinsics_names(topic: &str) -> Vec<&str> {
     let folders = || successors(Some(parent(topic)), |folder| (!folder.is_empty()).then(|| parent(folder)));
     let is_image = |folder: &str| {
         let name = folder[parent_length(folder)..].trim_start_matches('/');
@@ -106,7 +106,7 @@ pub(crate) fn intrinsics_names(topic: &str) -> Vec<&str> {
 }
 
 /// Camera of a topic with intrinsics: its folder, without `info`, which RealSense's bags of ROS 1 add.
-pub(crate) fn camera_of_info(topic: &str) -> &str {
+pub fn camera_of_info(topic: &str) -> &str {
     let camera = camera_name(topic);
     camera.strip_suffix("/info").unwrap_or(camera)
 }
@@ -141,7 +141,7 @@ const CODECS: [(&str, &str); 13] = [
 
 /// Kind of image data that is not read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum ForeignData {
+pub enum ForeignData {
     Empty,
     /// Frames of a video, with the name of the codec.
     Video(&'static str),
@@ -153,7 +153,7 @@ pub(crate) enum ForeignData {
 impl ForeignData {
     /// Detects the kind by the first bytes, or else by the format that the message states. `ending` is the file ending
     /// of an image format that is known but not read; empty if there is none.
-    pub(crate) fn detect(format: &str, bytes: &[u8], ending: &'static str) -> Self {
+    pub fn detect(format: &str, bytes: &[u8], ending: &'static str) -> Self {
         if bytes.is_empty() {
             return Self::Empty;
         }
@@ -177,7 +177,7 @@ impl ForeignData {
     }
 
     /// Description for messages, with the format that the message states.
-    pub(crate) fn words(self, format: &str) -> String {
+    pub fn words(self, format: &str) -> String {
         let format = match format.trim() {
             "" => "no format stated".to_owned(),
             format => format!("format {:?}", excerpt(format, MAX_FORMAT)),

@@ -16,16 +16,16 @@ const MAX_DEFINITION_BYTES: usize = 64 << 10;
 
 /// Exposure of one image.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Exposure {
+pub struct Exposure {
     /// Time of the image.
-    pub(crate) stamp: Nanoseconds,
+    pub stamp: Nanoseconds,
     /// Values by field name, in the units of the driver.
-    pub(crate) values: Map<String, Value>,
+    pub values: Map<String, Value>,
 }
 
 /// Fields of a message after its header, in order.
 #[derive(Debug, Clone)]
-pub(crate) struct ExposureFields {
+pub struct ExposureFields {
     encoding: Encoding,
     fields: Vec<(Primitive, String)>,
 }
@@ -85,7 +85,7 @@ impl ExposureFields {
     ///
     /// # Errors
     /// If the message is shorter than its fields.
-    pub(crate) fn parse(&self, bytes: &[u8]) -> Result<Option<Exposure>, String> {
+    pub fn parse(&self, bytes: &[u8]) -> Result<Option<Exposure>, String> {
         let mut reader = match self.encoding {
             Encoding::Ros1 => FieldReader::unaligned(bytes),
             _ => FieldReader::cdr(bytes)?,
@@ -156,7 +156,7 @@ impl Primitive {
 
 /// Serialization of messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Encoding {
+pub enum Encoding {
     Cdr,
     Ros1,
     Protobuf,

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use crate::pictures::{FrameConversion, StatedColours};
-use crate::types::text::shell_word;
+use darkqa_base::types::text::shell_word;
+use darkqa_pictures::{FrameConversion, StatedColours};
 
 /// Colours of a frame in the words of ffmpeg.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -11,23 +11,23 @@ use serde::Deserialize;
 use super::Nanoseconds;
 use super::exposure::Encoding;
 use super::fields::{FieldReader, fields};
-use crate::pictures::raw_image::RawImage;
-use crate::types::Intrinsics;
-use crate::types::text::excerpt;
+use darkqa_base::types::Intrinsics;
+use darkqa_base::types::text::excerpt;
+use darkqa_pictures::raw_image::RawImage;
 
 /// Image of a message with its metadata.
 #[derive(Debug)]
-pub(crate) struct ImageMessage<'a> {
+pub struct ImageMessage<'a> {
     /// Time of the image; `None` if the message has 0.
-    pub(crate) stamp: Option<Nanoseconds>,
+    pub stamp: Option<Nanoseconds>,
     /// Name of the coordinate frame of the camera.
-    pub(crate) frame_id: String,
-    pub(crate) image: MessageImage<'a>,
+    pub frame_id: String,
+    pub image: MessageImage<'a>,
 }
 
 /// Image data of a message.
 #[derive(Debug)]
-pub(crate) enum MessageImage<'a> {
+pub enum MessageImage<'a> {
     /// Rows of samples.
     Raw(RawImage<'a>),
     /// A JPEG or PNG file.
@@ -52,7 +52,7 @@ impl MessageImage<'_> {
 const MAX_EMPTY_BYTES: usize = 4096;
 
 /// True if the image of a message has no pixels.
-pub(crate) fn is_without_image(schema: &str, encoding: Encoding, bytes: &[u8]) -> bool {
+pub fn is_without_image(schema: &str, encoding: Encoding, bytes: &[u8]) -> bool {
     bytes.len() <= MAX_EMPTY_BYTES
         && ImageMessage::parse(schema, encoding, bytes).is_ok_and(|message| message.image.is_empty())
 }
@@ -75,7 +75,7 @@ impl<'a> ImageMessage<'a> {
     ///
     /// # Errors
     /// If it is not a message of this type, or has depth or a color mosaic in an image file.
-    pub(crate) fn parse(schema: &str, encoding: Encoding, bytes: &'a [u8]) -> Result<Self, String> {
+    pub fn parse(schema: &str, encoding: Encoding, bytes: &'a [u8]) -> Result<Self, String> {
         let message = Self::parse_any(schema, encoding, bytes)?;
         if let MessageImage::File { format, .. } = &message.image {
             check_format(format)?;
@@ -268,7 +268,7 @@ fn skip_sequence_number(schema: &str, encoding: Encoding, reader: &mut FieldRead
 }
 
 /// Time stamp at the start of a message; `None` if the whole message must be read.
-pub(crate) fn stamp(schema: &str, encoding: Encoding, start: &[u8]) -> Option<Nanoseconds> {
+pub fn stamp(schema: &str, encoding: Encoding, start: &[u8]) -> Option<Nanoseconds> {
     match encoding {
         Encoding::Cdr => FieldReader::cdr(start).ok()?.time().ok(),
         Encoding::Ros1 => {
@@ -286,13 +286,13 @@ pub(crate) fn stamp(schema: &str, encoding: Encoding, start: &[u8]) -> Option<Na
 
 /// Intrinsics of a camera, for raw and rectified images of one size in pixels.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct CameraInfo {
-    pub(crate) width: usize,
-    pub(crate) height: usize,
+pub struct CameraInfo {
+    pub width: usize,
+    pub height: usize,
     /// Intrinsics of raw images, from the matrix K; `None` if K is missing or invalid.
-    pub(crate) raw: Option<Intrinsics>,
+    pub raw: Option<Intrinsics>,
     /// Intrinsics of rectified images, from the matrix P; `None` if P is missing or invalid.
-    pub(crate) rectified: Option<Intrinsics>,
+    pub rectified: Option<Intrinsics>,
 }
 
 impl CameraInfo {
@@ -300,7 +300,7 @@ impl CameraInfo {
     ///
     /// # Errors
     /// If `bytes` is not such a message.
-    pub(crate) fn parse(schema: &str, encoding: Encoding, bytes: &[u8]) -> Result<Self, String> {
+    pub fn parse(schema: &str, encoding: Encoding, bytes: &[u8]) -> Result<Self, String> {
         match encoding {
             Encoding::Cdr => Self::from_fields(schema, encoding, FieldReader::cdr(bytes)?),
             Encoding::Ros1 => Self::from_fields(schema, encoding, FieldReader::unaligned(bytes)),
@@ -346,7 +346,7 @@ impl CameraInfo {
 
     /// Intrinsics for an image of this size: rectified if the topic name contains `rect`, else raw. `None` if they are
     /// unknown or the calibration is for another size.
-    pub(crate) fn intrinsics_for(&self, topic: &str, size: (usize, usize)) -> Option<Intrinsics> {
+    pub fn intrinsics_for(&self, topic: &str, size: (usize, usize)) -> Option<Intrinsics> {
         if (self.width, self.height) != size {
             return None;
         }

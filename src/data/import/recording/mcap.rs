@@ -22,7 +22,7 @@ use super::fields::FieldReader;
 const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 
 /// Maximum length of a message, in bytes (chosen), to limit memory. A 4K image in colour with 16 bits has 50 MB.
-pub(crate) const MAX_MESSAGE_BYTES: u64 = 64 << 20;
+pub const MAX_MESSAGE_BYTES: u64 = 64 << 20;
 
 /// Maximum length of a schema or channel record, in bytes (chosen). Message definitions have some kilobytes.
 const MAX_DEFINITION_BYTES: u64 = 1 << 20;
@@ -63,7 +63,7 @@ mod opcode {
 
 /// Event while reading a recording.
 #[derive(Debug)]
-pub(crate) enum Event {
+pub enum Event {
     /// A message. Its body may be read next.
     Message(MessageHeader),
     /// End of a chunk. Its messages are intact.
@@ -80,18 +80,18 @@ pub(crate) enum Event {
 
 /// Message without its body.
 #[derive(Debug, Clone)]
-pub(crate) struct MessageHeader {
-    pub(crate) channel: Arc<Channel>,
+pub struct MessageHeader {
+    pub channel: Arc<Channel>,
     /// Time when it was recorded.
-    pub(crate) log_time: Nanoseconds,
+    pub log_time: Nanoseconds,
     /// Length of the body, in bytes.
-    pub(crate) length: u64,
+    pub length: u64,
     /// True if it is in a chunk, whose checksum is checked at the end of the chunk.
-    pub(crate) is_in_chunk: bool,
+    pub is_in_chunk: bool,
 }
 
 /// Reader of a recording.
-pub(crate) struct McapReader<R: Read> {
+pub struct McapReader<R: Read> {
     source: McapSource<R>,
     /// Length of the file, in bytes.
     length: u64,
@@ -102,7 +102,7 @@ pub(crate) struct McapReader<R: Read> {
     schemas: HashMap<u16, Schema>,
     channels: HashMap<u16, Arc<Channel>>,
     /// Number of messages without a channel record.
-    pub(crate) messages_without_channel: u64,
+    pub messages_without_channel: u64,
     /// Body of the current record, as far as it is read.
     body: Vec<u8>,
     /// Error of a body that could not be read.
@@ -149,7 +149,7 @@ impl<R: Read + Seek> McapReader<R> {
     ///
     /// # Errors
     /// If it is not an MCAP file.
-    pub(crate) fn open(mut file: R) -> Result<Self, String> {
+    pub fn open(mut file: R) -> Result<Self, String> {
         let length =
             file.seek(SeekFrom::End(0)).and_then(|length| file.rewind().map(|()| length)).map_err(|e| e.to_string())?;
         let mut file = BufReader::with_capacity(BUFFER_BYTES, file);
@@ -174,7 +174,7 @@ impl<R: Read + Seek> McapReader<R> {
     }
 
     /// Reads the next event; `None` at the end.
-    pub(crate) fn next(&mut self) -> Option<Event> {
+    pub fn next_event(&mut self) -> Option<Event> {
         loop {
             if matches!(self.source, McapSource::Ended) {
                 return None;
@@ -188,13 +188,13 @@ impl<R: Read + Seek> McapReader<R> {
     }
 
     /// Offset in the file of the end of the current record.
-    pub(crate) fn position(&self) -> u64 {
+    pub fn position(&self) -> u64 {
         self.next_record.min(self.length)
     }
 
     /// Reads the body of the message of the last event, and decompresses it if the recorder compressed each message.
     /// `None` if it cannot be read; the next event then has the reason.
-    pub(crate) fn body(&mut self) -> Option<&[u8]> {
+    pub fn body(&mut self) -> Option<&[u8]> {
         self.read_body(self.unread)?;
         if self.body.starts_with(&ZSTD_MAGIC)
             && let Some(body) = decompress_message(&self.body)
@@ -206,7 +206,7 @@ impl<R: Read + Seek> McapReader<R> {
 
     /// Reads the start of the body, at least `min` bytes if the body is that long; `None` as for [`Self::body`], which
     /// may still be called for the whole body.
-    pub(crate) fn start_of_body(&mut self, min: u64) -> Option<&[u8]> {
+    pub fn start_of_body(&mut self, min: u64) -> Option<&[u8]> {
         self.read_body(self.unread.min(min))?;
         if self.body.starts_with(&ZSTD_MAGIC) {
             return self.body();
@@ -215,7 +215,7 @@ impl<R: Read + Seek> McapReader<R> {
     }
 
     /// Takes out the body that was read.
-    pub(crate) fn take_body(&mut self) -> Vec<u8> {
+    pub fn take_body(&mut self) -> Vec<u8> {
         mem::take(&mut self.body)
     }
 

@@ -18,19 +18,19 @@ mod overview;
 mod sampling;
 #[cfg(test)]
 mod tests;
-pub(crate) mod video;
+pub mod video;
 
-pub(crate) use channel::{Channel, ChannelContent, ForeignData, camera_name, camera_of_info, intrinsics_names};
-pub(crate) use exposure::{Encoding, Exposure};
-pub(crate) use image_message::{CameraInfo, ImageMessage, MessageImage, is_without_image, stamp};
-pub(crate) use mcap::{Event, MAX_MESSAGE_BYTES, McapReader, MessageHeader};
-pub(crate) use overview::{FileImage, Overview, TopicOverview};
-pub(crate) use sampling::{GreyBlocks, Place, Sampler, SamplingArgs, Stretches, TopicClock};
+pub use channel::{Channel, ChannelContent, ForeignData, camera_name, camera_of_info, intrinsics_names};
+pub use exposure::{Encoding, Exposure};
+pub use image_message::{CameraInfo, ImageMessage, MessageImage, is_without_image, stamp};
+pub use mcap::{Event, MAX_MESSAGE_BYTES, McapReader, MessageHeader};
+pub use overview::{FileImage, Overview, TopicOverview};
+pub use sampling::{GreyBlocks, Place, Sampler, SamplingArgs, Stretches, TopicClock};
 
 /// Time in nanoseconds, usually since 1970.
-pub(crate) type Nanoseconds = i64;
+pub type Nanoseconds = i64;
 
 /// Converts a time to seconds.
-pub(crate) fn seconds(time: Nanoseconds) -> f64 {
+pub fn seconds(time: Nanoseconds) -> f64 {
     time as f64 / 1e9
 }

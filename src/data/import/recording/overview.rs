@@ -8,7 +8,7 @@ use super::exposure::Encoding;
 use super::image_message::{ImageMessage, MessageImage, has_unread_kind};
 use super::mcap::{Event, MAX_MESSAGE_BYTES, McapReader, MessageHeader};
 use super::{Nanoseconds, seconds};
-use crate::types::text::excerpt;
+use darkqa_base::types::text::excerpt;
 
 /// Maximum number of characters of an image format, because names of encodings are from the recording.
 const MAX_FORMAT_LENGTH: usize = 100;
@@ -18,38 +18,38 @@ const UNREAD: &str = "not read: ";
 
 /// All topics of a recording.
 #[derive(Debug, Default)]
-pub(crate) struct Overview {
-    pub(crate) topics: BTreeMap<String, TopicOverview>,
+pub struct Overview {
+    pub topics: BTreeMap<String, TopicOverview>,
     /// Messages about damage.
-    pub(crate) problems: Vec<String>,
+    pub problems: Vec<String>,
     /// Log time of the first message.
     start: Option<Nanoseconds>,
 }
 
 /// One topic of a recording.
 #[derive(Debug)]
-pub(crate) struct TopicOverview {
-    pub(crate) schema: String,
+pub struct TopicOverview {
+    pub schema: String,
     /// Number of messages.
-    pub(crate) count: usize,
+    pub count: usize,
     /// First and last log time of its messages.
-    pub(crate) times: [Nanoseconds; 2],
+    pub times: [Nanoseconds; 2],
     /// Size and encoding of the first image that can be read, or why the first message cannot be read; empty for topics
     /// without images.
-    pub(crate) image_format: String,
+    pub image_format: String,
     /// True if no further message needs a look: an image was read, or all images of the topic are of a kind that is not
     /// read.
     is_settled: bool,
     /// Number of messages before the first image that can be read.
-    pub(crate) broken: usize,
+    pub broken: usize,
     /// Why the first of these cannot be read.
-    pub(crate) first_problem: String,
+    pub first_problem: String,
     /// Serialization of a topic with video.
-    pub(crate) video: Option<Encoding>,
+    pub video: Option<Encoding>,
 }
 
 /// Image file of a message.
-pub(crate) enum FileImage {
+pub enum FileImage {
     /// One that can be read, with its width and height in pixels.
     Readable([u32; 2]),
     /// One that cannot be read, with the reason.
@@ -152,17 +152,17 @@ impl TopicOverview {
     }
 
     /// True if a message has an image that can be read.
-    pub(crate) fn has_images(&self) -> bool {
+    pub fn has_images(&self) -> bool {
         !self.image_format.is_empty() && !self.image_format.starts_with(UNREAD)
     }
 
     /// Seconds from the first message to the last.
-    pub(crate) fn duration(&self) -> f64 {
+    pub fn duration(&self) -> f64 {
         seconds(self.times[1].saturating_sub(self.times[0]))
     }
 
     /// Messages per second; `None` for a single message.
-    pub(crate) fn rate(&self) -> Option<f64> {
+    pub fn rate(&self) -> Option<f64> {
         let duration = self.duration();
         (duration > 0.0).then(|| (self.count - 1) as f64 / duration)
     }
@@ -171,13 +171,13 @@ impl TopicOverview {
 impl Overview {
     /// Adds the messages of a file called `place`. `image` reads an image file, from the format that its message states
     /// and its bytes.
-    pub(crate) fn add<R: Read + Seek>(
+    pub fn add<R: Read + Seek>(
         &mut self,
         place: &str,
         mut reader: McapReader<R>,
         image: impl Fn(&str, &[u8]) -> FileImage,
     ) {
-        while let Some(event) = reader.next() {
+        while let Some(event) = reader.next_event() {
             match event {
                 Event::Message(message) => {
                     if let Some(topic) = self.count(&message)
@@ -226,7 +226,7 @@ impl Overview {
     }
 
     /// Names of the topics with images.
-    pub(crate) fn image_topics(&self) -> Vec<&str> {
+    pub fn image_topics(&self) -> Vec<&str> {
         self.topics.iter().filter(|(_, topic)| topic.has_images()).map(|(name, _)| &**name).collect()
     }
 }

@@ -9,8 +9,8 @@ use std::num::NonZeroUsize;
 use clap::Args;
 
 use super::{Nanoseconds, seconds};
-use crate::types::flags::positive;
-use crate::types::{Decides, Rgb};
+use darkqa_base::types::flags::positive;
+use darkqa_base::types::{Decides, Rgb};
 
 /// Default interval between two frames, in seconds, as in DarkQA.
 const INTERVAL: f64 = 2.0;
@@ -18,7 +18,7 @@ const INTERVAL: f64 = 2.0;
 /// Flags that choose the frames of each topic.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Key frames")]
-pub(crate) struct SamplingArgs {
+pub struct SamplingArgs {
     /// One frame of each topic every N seconds; 0 takes every frame; default: 2, or every frame if another flag chooses
     #[arg(long, value_name = "SECONDS", value_parser = interval, add = Decides::Trials)]
     pub every: Option<f64>,
@@ -45,13 +45,13 @@ fn interval(text: &str) -> Result<f64, String> {
 
 impl SamplingArgs {
     /// Interval between two frames in seconds: `--every`, or its default.
-    pub(crate) fn interval(&self) -> f64 {
+    pub fn interval(&self) -> f64 {
         let has_other_flag = !self.at.is_empty() || self.max_frames.is_some() || self.changed.is_some();
         self.every.unwrap_or(if has_other_flag { 0.0 } else { INTERVAL })
     }
 
     /// Sampler for a topic of this duration, in seconds.
-    pub(crate) fn sampler(&self, duration: f64) -> Sampler {
+    pub fn sampler(&self, duration: f64) -> Sampler {
         // For a duration D and N frames, frames are due at 0, D/N, 2D/N, ….
         let spread = self.max_frames.map_or(0.0, |limit| duration / limit.get() as f64);
         let mut at: Vec<Nanoseconds> = self.at.iter().map(|seconds| nanoseconds(*seconds)).collect();
@@ -68,7 +68,7 @@ impl SamplingArgs {
     }
 
     /// Description of the choice.
-    pub(crate) fn description(&self) -> String {
+    pub fn description(&self) -> String {
         let mut words = Vec::new();
         match self.at.len() {
             0 if self.interval() > 0.0 => words.push(format!("one every {} s", self.interval())),
@@ -95,7 +95,7 @@ fn nanoseconds(seconds: f64) -> Nanoseconds {
 
 /// Chooses the frames of one topic, one after the other.
 #[derive(Debug)]
-pub(crate) struct Sampler {
+pub struct Sampler {
     /// Minimum time between two frames; 0 for every frame.
     interval: Nanoseconds,
     /// Times to sample since the first frame, sorted; empty if the interval decides.
@@ -110,7 +110,7 @@ pub(crate) struct Sampler {
 
 /// Progress of a sampler.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct SamplerProgress {
+pub struct SamplerProgress {
     /// Number of times given with `--at` that are in the past.
     passed: usize,
     /// Number of chosen frames.
@@ -121,17 +121,17 @@ pub(crate) struct SamplerProgress {
 
 impl Sampler {
     /// The progress so far.
-    pub(crate) fn progress(&self) -> SamplerProgress {
+    pub fn progress(&self) -> SamplerProgress {
         self.progress
     }
 
     /// Returns to an earlier progress, so that the next frame takes the place of one that is broken.
-    pub(crate) fn reset(&mut self, progress: SamplerProgress) {
+    pub fn reset(&mut self, progress: SamplerProgress) {
         self.progress = progress;
     }
 
     /// Chooses a frame by its time. If [`Self::compares_pixels`], [`Self::has_changed`] decides about a due frame.
-    pub(crate) fn is_due(&mut self, place: Place) -> bool {
+    pub fn is_due(&mut self, place: Place) -> bool {
         let since = place.since;
         if self.progress.taken >= self.limit {
             return false;
@@ -152,12 +152,12 @@ impl Sampler {
     }
 
     /// True if the pixels decide about due frames.
-    pub(crate) fn compares_pixels(&self) -> bool {
+    pub fn compares_pixels(&self) -> bool {
         self.min_change.is_some()
     }
 
     /// Chooses a due frame if it differs enough from the last chosen frame.
-    pub(crate) fn has_changed(&mut self, thumbnail: GreyBlocks) -> bool {
+    pub fn has_changed(&mut self, thumbnail: GreyBlocks) -> bool {
         let min_change = self.min_change.unwrap_or(0.0);
         let has_changed = self.last_taken.as_ref().is_none_or(|last| last.difference(&thumbnail) > min_change);
         if has_changed {
@@ -169,7 +169,7 @@ impl Sampler {
     }
 
     /// Times given with `--at`, in seconds, after the last frame.
-    pub(crate) fn missed(&self) -> Vec<f64> {
+    pub fn missed(&self) -> Vec<f64> {
         self.at.iter().skip(self.progress.passed).map(|time| seconds(*time)).collect()
     }
 }
@@ -184,18 +184,18 @@ const MAX_DELAY_DIFFERENCE: Nanoseconds = 1_000_000_000;
 
 /// Position of a frame in a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Place {
+pub struct Place {
     /// Time of the frame on the clock of its topic.
-    pub(crate) time: Nanoseconds,
+    pub time: Nanoseconds,
     /// Time since the first frame of the drive, at least 0.
-    pub(crate) since: Nanoseconds,
+    pub since: Nanoseconds,
     /// Number of the stretch, from 0.
-    pub(crate) stretch: u64,
+    pub stretch: u64,
 }
 
 /// Clock of one topic.
 #[derive(Debug, Default)]
-pub(crate) struct TopicClock(Option<ClockRun>);
+pub struct TopicClock(Option<ClockRun>);
 
 /// Run of a clock without a jump back.
 #[derive(Debug, Clone, Copy)]
@@ -222,7 +222,7 @@ impl ClockRun {
 /// have different clocks; the log time relates them, also after a clock jumped back. If the log time jumped back, too,
 /// the next stretch starts.
 #[derive(Debug)]
-pub(crate) struct Stretches {
+pub struct Stretches {
     /// Duration of a stretch.
     length: Nanoseconds,
     start: Option<DriveStart>,
@@ -237,17 +237,17 @@ struct DriveStart {
 
 impl Stretches {
     /// Stretches of this duration.
-    pub(crate) fn new(seconds: f64) -> Self {
+    pub fn new(seconds: f64) -> Self {
         Self { length: ((seconds * 1e9) as Nanoseconds).max(1), start: None }
     }
 
     /// Log time of the first frame.
-    pub(crate) fn log_start(&self) -> Option<Nanoseconds> {
+    pub fn log_start(&self) -> Option<Nanoseconds> {
         self.start.map(|start| start.log_time)
     }
 
     /// Position of the next frame of a topic, from its time on the clock of its topic and its log time.
-    pub(crate) fn place(&mut self, clock: &mut TopicClock, time: Nanoseconds, log_time: Nanoseconds) -> Place {
+    pub fn place(&mut self, clock: &mut TopicClock, time: Nanoseconds, log_time: Nanoseconds) -> Place {
         let start = *self.start.get_or_insert(DriveStart { time, log_time });
         let mut run = match clock.0 {
             Some(run) if run.latest.saturating_sub(time) <= MAX_REORDERING => run,
@@ -295,11 +295,11 @@ const SIDE: usize = 16;
 
 /// Mean grey codes of 16 × 16 blocks; grey is the mean of the three channels.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct GreyBlocks(Vec<f64>);
+pub struct GreyBlocks(Vec<f64>);
 
 impl GreyBlocks {
     /// Makes the thumbnail of an image.
-    pub(crate) fn new(image: &Rgb) -> Self {
+    pub fn new(image: &Rgb) -> Self {
         let mut blocks = vec![(0_u64, 0_u64); SIDE * SIDE];
         for (y, row) in image.samples().chunks_exact(image.width() * 3).enumerate() {
             let line = &mut blocks[y * SIDE / image.height() * SIDE..][..SIDE];
@@ -315,7 +315,7 @@ impl GreyBlocks {
 
     /// Mean absolute difference of the blocks, in 8-bit codes. Frames of other sizes may have fewer blocks; only the
     /// blocks that both have are compared.
-    pub(crate) fn difference(&self, other: &Self) -> f64 {
+    pub fn difference(&self, other: &Self) -> f64 {
         let count = self.0.len().min(other.0.len()).max(1);
         self.0.iter().zip(&other.0).map(|(a, b)| (a - b).abs()).sum::<f64>() / count as f64
     }
@@ -387,7 +387,7 @@ mod tests {
             .zip([10, 14, 15, 16, 200])
             .map(|(i, code)| {
                 let place = Place { time: i, since: i, stretch: 0 };
-                let grey = crate::types::Rgb::new(1, 1, vec![code; 3]).unwrap();
+                let grey = darkqa_base::types::Rgb::new(1, 1, vec![code; 3]).unwrap();
                 sampler.is_due(place) && sampler.has_changed(GreyBlocks::new(&grey))
             })
             .collect();

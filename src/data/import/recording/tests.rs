@@ -29,7 +29,7 @@ fn read(file: &[u8]) -> ReadBack {
     let Ok(mut reader) = McapReader::open(Cursor::new(file)) else {
         return found;
     };
-    while let Some(event) = reader.next() {
+    while let Some(event) = reader.next_event() {
         match event {
             Event::Message(message) if message.length <= MAX_MESSAGE_BYTES => {
                 let schema = &message.channel.schema;
@@ -117,7 +117,7 @@ fn unknown_compressions_are_named() {
     let at = file.windows(3).position(|part| part == b"lz4").unwrap();
     file[at..at + 3].copy_from_slice(b"lzx");
     let mut reader = McapReader::open(Cursor::new(file)).unwrap();
-    let Some(Event::ChunkDamaged { problem, .. }) = reader.next() else { panic!("a damaged chunk expected") };
+    let Some(Event::ChunkDamaged { problem, .. }) = reader.next_event() else { panic!("a damaged chunk expected") };
     assert!(problem.contains("\"lzx\"; zstd, lz4 or none expected"), "{problem}");
 }
 

@@ -11,11 +11,11 @@ use std::thread::{self, JoinHandle};
 
 use super::Nanoseconds;
 use super::ffmpeg_colours::{FrameColours, needs_colours};
-use crate::error::{Error, Result};
-use crate::pictures::FrameConversion;
-use crate::pictures::decode_rule::MAX_PIXELS;
-use crate::types::Rgb;
-use crate::types::text::excerpt;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Rgb;
+use darkqa_base::types::text::excerpt;
+use darkqa_pictures::FrameConversion;
+use darkqa_pictures::decode_rule::MAX_PIXELS;
 
 /// Maximum length of an expression that selects frames, in bytes: a command line of Windows has at most 32,767
 /// characters. Without the expression, all frames are decoded.
@@ -23,14 +23,14 @@ const MAX_SELECT: usize = 30_000;
 
 /// Video file with metadata from ffmpeg.
 #[derive(Debug)]
-pub(crate) struct Video {
+pub struct Video {
     path: PathBuf,
     /// Container format that ffmpeg has to assume; `None` to find it out.
     format: Option<&'static str>,
     /// Duration in seconds; `None` if unknown.
-    pub(crate) duration: Option<f64>,
+    pub duration: Option<f64>,
     /// Codec, size and rate of the first video stream.
-    pub(crate) stream: String,
+    pub stream: String,
     /// Option of the installed version to output every frame once.
     passthrough: [&'static str; 2],
     /// True if the pictures are only for displays with Dolby Vision.
@@ -39,11 +39,11 @@ pub(crate) struct Video {
 
 /// Frame of a video.
 #[derive(Debug)]
-pub(crate) struct VideoFrame {
+pub struct VideoFrame {
     /// Time from the start of the video.
-    pub(crate) time: Nanoseconds,
+    pub time: Nanoseconds,
     /// Image in sRGB.
-    pub(crate) image: Rgb,
+    pub image: Rgb,
 }
 
 /// Conversion of the frames of a video to sRGB.
@@ -57,7 +57,7 @@ struct VideoConversion {
 
 /// Running decoder of a video. Dropping it stops ffmpeg.
 #[derive(Debug)]
-pub(crate) struct VideoFrames {
+pub struct VideoFrames {
     path: PathBuf,
     /// Codec of the video, as ffmpeg calls it.
     codec: String,
@@ -82,7 +82,7 @@ impl Video {
     ///
     /// # Errors
     /// If ffmpeg is not on PATH, or finds no video in the file.
-    pub(crate) fn open(path: &Path) -> Result<Self> {
+    pub fn open(path: &Path) -> Result<Self> {
         Self::open_as(path, None)
     }
 
@@ -91,12 +91,12 @@ impl Video {
     ///
     /// # Errors
     /// As [`Self::open`].
-    pub(crate) fn open_mp4(path: &Path) -> Result<Self> {
+    pub fn open_mp4(path: &Path) -> Result<Self> {
         Self::open_as(path, Some("mov"))
     }
 
     fn open_as(path: &Path, format: Option<&'static str>) -> Result<Self> {
-        crate::files::refuse_pipes(path).map_err(|e| Error::file(path, "read", e))?;
+        darkqa_base::files::refuse_pipes(path).map_err(|e| Error::file(path, "read", e))?;
         let output = ffmpeg(path, format).stdin(Stdio::null()).output().map_err(|e| start_error(&e))?;
         let log = String::from_utf8_lossy(&output.stderr).into_owned();
         let Some((_, stream)) = log.split_once(" Video: ") else {
@@ -121,7 +121,7 @@ impl Video {
     ///
     /// # Errors
     /// If ffmpeg cannot be started, or the colours of the video are not converted.
-    pub(crate) fn frames(&self, interval: f64) -> Result<VideoFrames> {
+    pub fn frames(&self, interval: f64) -> Result<VideoFrames> {
         if interval == 0.0 {
             return self.converted(None);
         }
@@ -135,7 +135,7 @@ impl Video {
     ///
     /// # Errors
     /// As [`Self::frames`].
-    pub(crate) fn frames_within(&self, spans: &[[f64; 2]]) -> Result<VideoFrames> {
+    pub fn frames_within(&self, spans: &[[f64; 2]]) -> Result<VideoFrames> {
         let spans: Vec<String> = spans.iter().map(|[from, to]| format!("between(t,{from:.6},{to:.6})")).collect();
         let select = spans.join("+");
         self.converted(Some(&*select).filter(|select| select.len() <= MAX_SELECT))
@@ -149,7 +149,7 @@ impl Video {
             return Err(error(problem.to_owned()));
         }
         let mut frames = self.decode(select, None)?;
-        let first = frames.next();
+        let first = frames.next_frame();
         let conversion = match &frames.colours {
             Some(colours) => colours.conversion(&self.path).map_err(error)?,
             None if needs_colours(&self.stream) && matches!(first, Ok(Some(_))) => {
@@ -245,7 +245,7 @@ impl VideoFrames {
     ///
     /// # Errors
     /// If ffmpeg fails, its output is not an image, or the colours change.
-    pub(crate) fn next(&mut self) -> Result<Option<VideoFrame>> {
+    pub fn next_frame(&mut self) -> Result<Option<VideoFrame>> {
         if let Some(first) = self.first.take() {
             return first;
         }
@@ -297,12 +297,12 @@ impl VideoFrames {
     }
 
     /// Name of the colours that are converted to sRGB; `None` if the codes are taken as sRGB codes.
-    pub(crate) fn converted_from(&self) -> Option<&str> {
+    pub fn converted_from(&self) -> Option<&str> {
         self.conversion.as_ref().map(|found| found.rule.name())
     }
 
     /// Share of the pixels so far whose light is above white and was clipped; `None` if the video is not HDR.
-    pub(crate) fn clipped_share(&self) -> Option<f64> {
+    pub fn clipped_share(&self) -> Option<f64> {
         let found = self.conversion.as_ref()?;
         found.rule.is_hdr().then(|| found.clipped as f64 / found.pixels.max(1) as f64)
     }
@@ -355,7 +355,7 @@ impl VideoFrames {
     }
 
     /// Message about damage that ffmpeg reported while it decoded the video to the end; `None` if it reported none.
-    pub(crate) fn damage(mut self) -> Option<String> {
+    pub fn damage(mut self) -> Option<String> {
         let log = self.ended_log();
         let first = log.first_damage.as_ref()?;
         let count = match log.damage_lines {

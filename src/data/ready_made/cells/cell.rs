@@ -10,9 +10,9 @@ use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 
 use super::text_list::parse_list;
-use crate::pictures::image_file::format::FileFormat;
-use crate::types::Digest;
-use crate::types::text::excerpt;
+use darkqa_base::types::Digest;
+use darkqa_base::types::text::excerpt;
+use darkqa_pictures::image_file::format::FileFormat;
 
 /// Maximum length of a path or a row id, in bytes. A longer text in the base64 alphabet is a file (as in VLMEvalKit,
 /// `vlmeval/dataset/image_base.py`).
@@ -27,7 +27,7 @@ const MIN_BASE64_LINE: usize = 60;
 
 /// Value in a row, without the bytes of images. Sets have millions of cells, so a cell is no larger than a `String`.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Cell {
+pub enum Cell {
     /// Null, or no such column in this row.
     Absent,
     Bool(bool),
@@ -61,14 +61,14 @@ impl FieldNames {
 
 /// Digest and format of a file whose bytes were dropped.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct DroppedFile {
-    pub(crate) digest: Digest,
+pub struct DroppedFile {
+    pub digest: Digest,
     /// Image format, from the first bytes; `None` if it is not supported.
-    pub(crate) format: Option<FileFormat>,
+    pub format: Option<FileFormat>,
 }
 
 impl DroppedFile {
-    pub(crate) fn from_bytes(bytes: &[u8]) -> Self {
+    pub fn from_bytes(bytes: &[u8]) -> Self {
         Self { digest: Digest::from_bytes(bytes), format: FileFormat::detect(bytes).ok() }
     }
 }
@@ -109,7 +109,7 @@ impl Cell {
 
     /// True if the cell has no value: null, an empty text or list, or a word for a missing value (`nan`, `N/A`, `None`,
     /// `null`).
-    pub(crate) fn is_absent(&self) -> bool {
+    pub fn is_absent(&self) -> bool {
         match self {
             Self::Absent => true,
             Self::Text(text) => {
@@ -123,7 +123,7 @@ impl Cell {
     }
 
     /// The cell as text; `None` if it is not a text, number or truth value, or is blank.
-    pub(crate) fn text(&self) -> Option<String> {
+    pub fn text(&self) -> Option<String> {
         match self {
             Self::Bool(is_true) => Some(is_true.to_string()),
             Self::Number(text) => Some(without_zero_fraction(text)),
@@ -133,7 +133,7 @@ impl Cell {
     }
 
     /// Parses a text with a JSON list or object; `None` if the cell has none.
-    pub(crate) fn parsed(&self) -> Option<Self> {
+    pub fn parsed(&self) -> Option<Self> {
         let Self::Text(text) = self else {
             return None;
         };
@@ -144,7 +144,7 @@ impl Cell {
     }
 
     /// Field of a struct by its name, or item of a list by its index from 0.
-    pub(crate) fn field(&self, name: &str) -> Option<&Self> {
+    pub fn field(&self, name: &str) -> Option<&Self> {
         if let Self::List(cells) = self {
             return cells.get(name.parse::<usize>().ok()?);
         }
@@ -155,7 +155,7 @@ impl Cell {
     }
 
     /// Kind of value, for messages.
-    pub(crate) fn kind(&self) -> &'static str {
+    pub fn kind(&self) -> &'static str {
         match self {
             Self::Absent => "nothing",
             Self::Bool(_) => "truth",
@@ -168,7 +168,7 @@ impl Cell {
     }
 
     /// Excerpt of the value with at most about `max` characters, for messages.
-    pub(crate) fn excerpt(&self, max: usize) -> String {
+    pub fn excerpt(&self, max: usize) -> String {
         let whole = match self {
             Self::Absent => String::new(),
             Self::Bool(_) | Self::Number(_) => self.text().unwrap_or_default(),
@@ -256,7 +256,7 @@ fn is_base64_or_space(byte: u8) -> bool {
 
 /// Step of the path from a cell to a value inside it.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) enum PathStep {
+pub enum PathStep {
     /// Item of a list, or of a text with a list.
     Item(usize),
     /// Field of a struct.
@@ -265,7 +265,7 @@ pub(crate) enum PathStep {
 
 impl Cell {
     /// Value at the end of a path; `None` if there is none.
-    pub(crate) fn value_at(&self, steps: &[PathStep]) -> Option<Self> {
+    pub fn value_at(&self, steps: &[PathStep]) -> Option<Self> {
         let Some((step, rest)) = steps.split_first() else {
             return Some(self.clone());
         };

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use csv::Position;
 
 use super::cell::{Cell, FieldNames};
-use crate::data::ready_made::columns::map::{ColumnMap, ColumnRole, known_names, normalize};
+use crate::ready_made::columns::map::{ColumnMap, ColumnRole, known_names, normalize};
 
 /// Maximum number of columns of a set (chosen).
 const MAX_COLUMNS: usize = 4096;
@@ -29,37 +29,37 @@ const MAX_TABLE_BYTES: usize = 1 << 30;
 /// All rows of a set, in the order of its files.
 #[derive(Debug, Default)]
 pub(crate) struct SetRows {
-    pub(crate) files: Vec<FileLabel>,
-    pub(crate) columns: Vec<String>,
+    pub files: Vec<FileLabel>,
+    pub columns: Vec<String>,
     /// Index of each column by its name.
     column_indices: HashMap<String, usize>,
     field_names: FieldNames,
     /// Whether the last file has each column.
     in_last_file: Vec<bool>,
-    pub(crate) rows: Vec<Row>,
+    pub rows: Vec<Row>,
     /// Memory of all rows, in bytes.
     bytes: usize,
     /// Messages about changes to the rows.
-    pub(crate) notes: Vec<String>,
+    pub notes: Vec<String>,
 }
 
 /// Name and configuration of a file of rows.
 #[derive(Debug, Clone)]
 pub(crate) struct FileLabel {
     /// Path of the file, for messages. For a file in an archive, it starts with the path of the archive.
-    pub(crate) path: PathBuf,
+    pub path: PathBuf,
     /// Folder of the file inside its archive; `None` outside archives.
-    pub(crate) inner: Option<PathBuf>,
+    pub inner: Option<PathBuf>,
     /// Configuration of the repository; empty if there is none.
-    pub(crate) config: String,
+    pub config: String,
 }
 
 /// One row. Trailing absent cells are not stored.
 #[derive(Debug)]
 pub(crate) struct Row {
     /// Index of its file in [`SetRows::files`].
-    pub(crate) file: usize,
-    pub(crate) place: RowPlace,
+    pub file: usize,
+    pub place: RowPlace,
     cells: Box<[Cell]>,
 }
 
@@ -283,9 +283,9 @@ const ANSWERING: [&str; 4] = ["gpt", "assistant", "model", "bot"];
 /// Paths of the first question and its answer in a column of conversations, in the notation of `--map`.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct ConversationPaths {
-    pub(crate) question: String,
+    pub question: String,
     /// `None` if the question has no answer.
-    pub(crate) answer: Option<String>,
+    pub answer: Option<String>,
 }
 
 impl ConversationPaths {

@@ -1,12 +1,12 @@
 //! Format of the answers in a ready-made set: [`AnswerFormat`], and [`find_format`] to find the one that fits all rows.
 
 use super::option_list::{OptionList, OptionOrigin, one_line};
-use crate::types::Choices;
-use crate::types::questions::letter;
+use darkqa_base::types::Choices;
+use darkqa_base::types::questions::letter;
 
 /// How an answer identifies a choice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum AnswerFormat {
+pub enum AnswerFormat {
     /// Letter of the choice: `A`, `(a)` or `A.`. A lower-case letter needs a bracket, full stop or colon.
     Letter,
     /// Text of the choice, ignoring letter case, surrounding space and a final full stop.
@@ -18,10 +18,10 @@ pub(crate) enum AnswerFormat {
 }
 
 impl AnswerFormat {
-    pub(crate) const ALL: [Self; 4] = [Self::Letter, Self::Text, Self::Index0, Self::Index1];
+    pub const ALL: [Self; 4] = [Self::Letter, Self::Text, Self::Index0, Self::Index1];
 
     /// Name in `--map` and messages.
-    pub(crate) fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Letter => "letter",
             Self::Text => "text",
@@ -30,12 +30,12 @@ impl AnswerFormat {
         }
     }
 
-    pub(crate) fn from_name(name: &str) -> Option<Self> {
+    pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|format| format.name() == name)
     }
 
     /// Index of the choice that the answer identifies; `None` if it identifies none.
-    pub(crate) fn choice_index(self, answer: &str, options: &OptionList) -> Option<usize> {
+    pub fn choice_index(self, answer: &str, options: &OptionList) -> Option<usize> {
         let answer = answer.trim();
         match self {
             Self::Letter => {
@@ -70,7 +70,7 @@ impl AnswerFormat {
 
     /// Like [`Self::choice_index`], for a format that the user did not choose: numbers do not identify options that the
     /// text of the question lists by letter.
-    pub(crate) fn inferred_choice_index(self, answer: &str, options: &OptionList) -> Option<usize> {
+    pub fn inferred_choice_index(self, answer: &str, options: &OptionList) -> Option<usize> {
         let is_number = matches!(self, Self::Index0 | Self::Index1);
         if is_number && options.origin == OptionOrigin::Question {
             return None;

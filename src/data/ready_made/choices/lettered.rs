@@ -4,10 +4,10 @@ use std::sync::LazyLock;
 
 use regex::Regex;
 
-use crate::data::ready_made::columns::map::split_instructions;
-use crate::types::Choices;
-use crate::types::questions::letter;
-use crate::types::text::excerpt;
+use crate::ready_made::columns::map::split_instructions;
+use darkqa_base::types::Choices;
+use darkqa_base::types::questions::letter;
+use darkqa_base::types::text::excerpt;
 
 /// Letter of an option in a text: `(A)`, `A.`, `A)` or `A:`.
 struct OptionLetter {

@@ -3,12 +3,12 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use crate::types::text::excerpt;
+use darkqa_base::types::text::excerpt;
 
 /// Options of a row.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
-pub(crate) struct OptionList {
-    pub(crate) texts: Arc<[String]>,
+pub struct OptionList {
+    pub texts: Arc<[String]>,
     /// Position of each option among its columns, which its letter or number refers to: if B is empty, C is still C.
     pub(super) positions: Vec<usize>,
     pub(super) origin: OptionOrigin,
@@ -42,7 +42,7 @@ impl OptionList {
     }
 
     /// Options in the text of a question, in order.
-    pub(crate) fn from_question(texts: &[String]) -> Self {
+    pub fn from_question(texts: &[String]) -> Self {
         Self { origin: OptionOrigin::Question, ..Self::from_list(texts) }
     }
 

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use super::lettered::{split_cell, without_letters};
 use super::option_list::OptionList;
-use crate::data::ready_made::cells::{Cell, Fields, Row, parse_list, parse_object};
-use crate::data::ready_made::columns::{ColumnRoles, SetColumn};
-use crate::types::questions::letter;
-use crate::types::shell_word;
-use crate::types::text::excerpt;
+use crate::ready_made::cells::{Cell, Fields, Row, parse_list, parse_object};
+use crate::ready_made::columns::{ColumnRoles, SetColumn};
+use darkqa_base::types::questions::letter;
+use darkqa_base::types::shell_word;
+use darkqa_base::types::text::excerpt;
 
 /// The answer options in the columns of a row.
 #[derive(Debug, PartialEq, Eq)]

@@ -6,29 +6,29 @@ use super::answer_format::{
     AnswerFormat, FormatSearch, RowAnswer, asks_yes_or_no, digit_index, find_format, yes_no_index,
 };
 use super::option_list::OptionList;
-use crate::data::ready_made::cells::{Cell, SetRows};
-use crate::data::ready_made::columns::map::{CellFormat, ColumnRole, map_flag};
-use crate::data::ready_made::columns::{ColumnRoles, SetColumn, answer_column, describe_columns};
-use crate::data::ready_made::items::{AnswerCell, RowQuestion};
-use crate::data::ready_made::omissions::{Omissions, RowOmission};
-use crate::types::Choices;
-use crate::types::text::{counted, excerpt};
+use crate::ready_made::cells::{Cell, SetRows};
+use crate::ready_made::columns::map::{CellFormat, ColumnRole, map_flag};
+use crate::ready_made::columns::{ColumnRoles, SetColumn, answer_column, describe_columns};
+use crate::ready_made::items::{AnswerCell, RowQuestion};
+use crate::ready_made::omissions::{Omissions, RowOmission};
+use darkqa_base::types::Choices;
+use darkqa_base::types::text::{counted, excerpt};
 
 /// Question of a row with its choices, including the correct one.
 #[derive(Debug)]
 pub(crate) struct SetQuestion {
     /// Index of the row in the table.
-    pub(crate) row: usize,
-    pub(crate) text: String,
-    pub(crate) choices: Choices,
+    pub row: usize,
+    pub text: String,
+    pub choices: Choices,
 }
 
 /// Questions of a set with their correct options.
 #[derive(Debug, Default)]
 pub(crate) struct SetTruths {
-    pub(crate) questions: Vec<SetQuestion>,
+    pub questions: Vec<SetQuestion>,
     /// Answer columns with their formats as text, for the summary.
-    pub(crate) columns: Vec<String>,
+    pub columns: Vec<String>,
 }
 
 /// Minimum share of questions that begin with a verb, as yes/no questions do (heuristic). Below it, 0 and 1 do not mean

@@ -6,10 +6,10 @@
 use super::column::SetColumn;
 use super::map::{ColumnRole, map_flag};
 use super::roles::ColumnRoles;
-use crate::data::ready_made::cells::SetRows;
-use crate::data::ready_made::choices::{AnswerFormat, OptionList, digit_index, yes_no_index};
-use crate::data::ready_made::items::{AnswerCell, RowQuestion};
-use crate::types::text::excerpt;
+use crate::ready_made::cells::SetRows;
+use crate::ready_made::choices::{AnswerFormat, OptionList, digit_index, yes_no_index};
+use crate::ready_made::items::{AnswerCell, RowQuestion};
+use darkqa_base::types::text::excerpt;
 
 /// Index of the choice that each row of a column identifies; `None` for a row without a valid answer.
 type RowChoices = Vec<Option<usize>>;

@@ -1,16 +1,16 @@
 //! Column of a set: [`SetColumn`].
 
-use crate::data::ready_made::cells::{Cell, Row};
+use crate::ready_made::cells::{Cell, Row};
 
 /// A column, or a field of the structs in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct SetColumn {
     /// Index in the table.
-    pub(crate) index: usize,
+    pub index: usize,
     /// Path of the field, with dots; `None` for the whole cell.
-    pub(crate) field: Option<String>,
+    pub field: Option<String>,
     /// Name for messages, with the field.
-    pub(crate) name: String,
+    pub name: String,
 }
 
 impl SetColumn {

@@ -2,8 +2,8 @@
 
 use super::column::SetColumn;
 use super::roles::FamilyColumns;
-use crate::data::ready_made::cells::{Row, SetRows};
-use crate::data::ready_made::choices::SetQuestion;
+use crate::ready_made::cells::{Row, SetRows};
+use crate::ready_made::choices::SetQuestion;
 
 /// Source of the family of each question.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -10,30 +10,30 @@ use std::sync::LazyLock;
 use regex::{Match, Regex};
 use serde::Deserialize;
 
-use crate::data::ready_made::choices::AnswerFormat;
-use crate::types::shell_word;
+use crate::ready_made::choices::AnswerFormat;
+use darkqa_base::types::shell_word;
 
 /// Value of `--map`: roles and their columns.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ColumnMap {
     text: String,
-    pub(crate) entries: Vec<MapEntry>,
+    pub entries: Vec<MapEntry>,
 }
 
 /// One `role=column` entry of a map.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct MapEntry {
+pub struct MapEntry {
     pub(super) role: ColumnRole,
     /// One column, several (for options or images) or a template with `{Column}`; empty turns the role off.
-    pub(crate) columns: Vec<String>,
+    pub columns: Vec<String>,
     /// Text of `columns` before it was split at commas. A column with exactly this name takes precedence.
     pub(super) unsplit: String,
-    pub(crate) format: CellFormat,
+    pub format: CellFormat,
 }
 
 /// Format of the cells in a column.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum CellFormat {
+pub enum CellFormat {
     /// Not given, to be inferred.
     Inferred,
     /// Options in one cell, separated by this text.
@@ -57,7 +57,7 @@ pub(crate) fn map_flag(role: ColumnRole, column: &str, format: Option<AnswerForm
 
 impl ColumnMap {
     /// Merges maps. An entry replaces earlier ones of the same role.
-    pub(crate) fn merge<'a>(maps: impl IntoIterator<Item = &'a Self>) -> Self {
+    pub fn merge<'a>(maps: impl IntoIterator<Item = &'a Self>) -> Self {
         let mut merged = Self::default();
         for map in maps {
             for entry in &map.entries {
@@ -69,7 +69,7 @@ impl ColumnMap {
     }
 
     /// Entry of a role; `None` if the map does not have the role.
-    pub(crate) fn entry(&self, role: ColumnRole) -> Option<&MapEntry> {
+    pub fn entry(&self, role: ColumnRole) -> Option<&MapEntry> {
         self.entries.iter().find(|entry| entry.role == role)
     }
 }
@@ -157,7 +157,7 @@ const COLUMNS: &str = include_str!("../columns.toml");
 /// Role of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum ColumnRole {
+pub enum ColumnRole {
     Question,
     Image,
     Options,

@@ -6,29 +6,29 @@ use std::collections::BTreeSet;
 
 use super::column::SetColumn;
 use super::map::{CellFormat, ColumnMap, ColumnRole, known_names, map_flag, normalize};
-use crate::data::ready_made::cells::{Cell, ConversationPaths, Row, SetRows};
-use crate::types::Choices;
-use crate::types::questions::letter;
-use crate::types::text::excerpt;
+use crate::ready_made::cells::{Cell, ConversationPaths, Row, SetRows};
+use darkqa_base::types::Choices;
+use darkqa_base::types::questions::letter;
+use darkqa_base::types::text::excerpt;
 
 /// Columns by role. If a role has several columns, they are in order of preference.
 #[derive(Debug)]
 pub(crate) struct ColumnRoles {
-    pub(crate) question: QuestionSource,
-    pub(crate) images: ImageColumns,
+    pub question: QuestionSource,
+    pub images: ImageColumns,
     /// Columns with all options of a row in one cell.
-    pub(crate) option_lists: Vec<SetColumn>,
+    pub option_lists: Vec<SetColumn>,
     /// Columns with one option each, in order.
-    pub(crate) option_cells: Vec<SetColumn>,
-    pub(crate) answers: Vec<SetColumn>,
-    pub(crate) ids: Vec<SetColumn>,
-    pub(crate) hint: Option<SetColumn>,
-    pub(crate) families: FamilyColumns,
-    pub(crate) evidence: Option<SetColumn>,
-    pub(crate) scene: Option<SetColumn>,
+    pub option_cells: Vec<SetColumn>,
+    pub answers: Vec<SetColumn>,
+    pub ids: Vec<SetColumn>,
+    pub hint: Option<SetColumn>,
+    pub families: FamilyColumns,
+    pub evidence: Option<SetColumn>,
+    pub scene: Option<SetColumn>,
     /// Text between the options in one cell, if given by the user.
-    pub(crate) option_separator: Option<String>,
-    pub(crate) in_question: OptionsInQuestion,
+    pub option_separator: Option<String>,
+    pub in_question: OptionsInQuestion,
 }
 
 /// Source of the text of a question.

@@ -13,9 +13,9 @@ use flate2::read::MultiGzDecoder;
 use tempfile::NamedTempFile;
 use zip::ZipArchive;
 
-use crate::error::{Error, Result};
-use crate::files;
-use crate::types::FrameId;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::FrameId;
 
 /// Maximum number of entries (chosen).
 const MAX_ENTRIES: usize = 500_000;
@@ -31,8 +31,8 @@ const MAX_IMAGE_BYTES: u64 = 1 << 30;
 const MAX_TEXT_BYTES: u64 = 1 << 22;
 
 /// A ZIP file with its directory in memory.
-pub(crate) struct Archive {
-    pub(crate) path: PathBuf,
+pub struct Archive {
+    pub path: PathBuf,
     /// Index of each file, by its name.
     indices: BTreeMap<String, usize>,
     zip: Mutex<ZipArchive<BufReader<BoundedFile>>>,
@@ -74,7 +74,7 @@ impl Archive {
     ///
     /// # Errors
     /// If it is not a ZIP file, or an entry is a link or has a path that is absolute or leads outside.
-    pub(crate) fn open(path: &Path) -> Result<Self> {
+    pub fn open(path: &Path) -> Result<Self> {
         let file = files::open(path).map_err(|e| Error::file(path, "read", e))?;
         let remaining = Arc::new(AtomicU64::new(MAX_DIRECTORY_BYTES));
         let bounded = BoundedFile { file, remaining: Arc::clone(&remaining) };
@@ -106,7 +106,7 @@ impl Archive {
     }
 
     /// Path of the ZIP file.
-    pub(crate) fn path(&self) -> &Path {
+    pub fn path(&self) -> &Path {
         &self.path
     }
 
@@ -120,7 +120,7 @@ impl Archive {
     }
 
     /// True if the archive has a file with this name.
-    pub(crate) fn has(&self, name: &str) -> bool {
+    pub fn has(&self, name: &str) -> bool {
         self.indices.contains_key(name)
     }
 
@@ -128,14 +128,14 @@ impl Archive {
     ///
     /// # Errors
     /// If it cannot be read or is longer than a gigabyte, whatever size the directory states.
-    pub(crate) fn read_image(&self, name: &str) -> Result<Vec<u8>> {
+    pub fn read_image(&self, name: &str) -> Result<Vec<u8>> {
         let mut bytes = Vec::new();
         self.copy(name, MAX_IMAGE_BYTES, &mut bytes)?;
         Ok(bytes)
     }
 
     /// Folders that have a file of this name, each with its last `/`; empty for the top level.
-    pub(crate) fn folders_with(&self, file: &str) -> Vec<String> {
+    pub fn folders_with(&self, file: &str) -> Vec<String> {
         let folders = self.indices.keys().filter_map(|name| name.strip_suffix(file));
         folders.filter(|folder| folder.is_empty() || folder.ends_with('/')).map(str::to_owned).collect()
     }
@@ -144,7 +144,7 @@ impl Archive {
     ///
     /// # Errors
     /// If a file cannot be read or written, or the files are too long, whatever sizes the directory states.
-    pub(crate) fn unpack(&self, files: impl Iterator<Item = (String, PathBuf)>) -> Result<()> {
+    pub fn unpack(&self, files: impl Iterator<Item = (String, PathBuf)>) -> Result<()> {
         let compressed = fs::metadata(&self.path).map_err(|e| Error::file(&self.path, "read", e))?.len();
         let mut remaining = max_decompressed_size(compressed);
         for (name, path) in files {
@@ -163,7 +163,7 @@ impl Archive {
     }
 
     /// Reads a short text file.
-    pub(crate) fn read_text(&self, name: &str) -> Result<String> {
+    pub fn read_text(&self, name: &str) -> Result<String> {
         let mut bytes = Vec::new();
         self.copy(name, MAX_TEXT_BYTES, &mut bytes)?;
         Ok(String::from_utf8_lossy(&bytes).into_owned())
@@ -205,7 +205,7 @@ impl Archive {
     ///
     /// # Errors
     /// If the path leads outside the archive, or there is no such file.
-    pub(crate) fn find(&self, base: &Path, spelled: &str) -> Result<FrameId, String> {
+    pub fn find(&self, base: &Path, spelled: &str) -> Result<FrameId, String> {
         let mut parts: Vec<String> = Vec::new();
         for part in base.join(spelled).components() {
             let is_inside = match part {

@@ -11,9 +11,9 @@ use glob::{MatchOptions, Pattern};
 use super::card::{Config, SplitPattern, parse_configs};
 use super::tree::Tree;
 use super::{SUPPORTED, extension, parquet};
-use crate::data::ready_made::settings::SetArgs;
-use crate::error::{Error, Result};
-use crate::types::shell_word;
+use crate::ready_made::settings::SetArgs;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::shell_word;
 
 /// Dataset card of a repository.
 const CARD: &str = "README.md";

@@ -10,23 +10,23 @@ use super::archive::Archive;
 use super::choose::{choose_files, is_set};
 use super::tree::Tree;
 use super::{SetFile, extension, is_zip_file};
-use crate::data::ready_made::settings::SetArgs;
-use crate::data::root::{Location, Root};
-use crate::error::{Error, Result};
+use crate::ready_made::settings::SetArgs;
+use crate::root::{Location, Root};
+use darkqa_base::error::{Error, Result};
 
 /// Files of a set, and the folders that may have its images.
 #[derive(Debug)]
 pub(crate) struct FoundFiles {
-    pub(crate) files: Vec<SetFile>,
+    pub files: Vec<SetFile>,
     /// Folder of the set.
-    pub(crate) folder: PathBuf,
+    pub folder: PathBuf,
     /// Further folders that paths may lead to: the files of a hub's cache, or the folders of further `--data` files.
-    pub(crate) further: Vec<PathBuf>,
+    pub further: Vec<PathBuf>,
     /// ZIP file of the set.
-    pub(crate) archive: Option<Arc<Archive>>,
+    pub archive: Option<Arc<Archive>>,
     /// Notes about skipped or missing files.
-    pub(crate) notes: Vec<String>,
-    pub(crate) joined: FileRelation,
+    pub notes: Vec<String>,
+    pub joined: FileRelation,
 }
 
 /// Relation of several files to each other.
@@ -39,7 +39,7 @@ pub(crate) enum FileRelation {
 }
 
 /// True if a folder has a ready-made set, or cannot be scanned.
-pub(crate) fn is_set_folder(folder: &Path) -> bool {
+pub fn is_set_folder(folder: &Path) -> bool {
     let Ok(tree) = Tree::from_folder(folder) else {
         return true;
     };

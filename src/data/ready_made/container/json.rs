@@ -13,9 +13,9 @@ use std::sync::Arc;
 use serde_json::{Map, Value};
 
 use super::super::cells::{Cell, JsonUnit, RowPlace, SetRows};
-use crate::error::{Error, Result};
-use crate::files::{self, NOT_UTF8, json_problem};
-use crate::types::shell_word;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{self, NOT_UTF8, json_problem};
+use darkqa_base::types::shell_word;
 
 type FileScanner = JsonScanner<BufReader<File>>;
 

@@ -19,14 +19,14 @@ use csv::{ByteRecord, Position, Reader, ReaderBuilder};
 use tempfile::NamedTempFile;
 
 use super::cells::{Cell, FileLabel, PathStep, RowPlace, SetRows};
-use crate::error::{Error, Result};
-use crate::files;
-use crate::types::shell_word;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::shell_word;
 
-pub(crate) use archive::Archive;
-pub(crate) use find::is_set_folder;
-pub(crate) use parquet_columns::ParquetColumns;
-pub(crate) use tree::cached_snapshot;
+pub use archive::Archive;
+pub use find::is_set_folder;
+pub use parquet_columns::ParquetColumns;
+pub use tree::cached_snapshot;
 
 pub(super) use find::{FileRelation, FoundFiles, find_files};
 
@@ -35,7 +35,7 @@ const SUPPORTED: &str = ".parquet, .tsv, .csv, .jsonl, .ndjson or .json (the tex
 
 /// One file of a table.
 #[derive(Debug)]
-pub(crate) struct SetFile {
+pub struct SetFile {
     pub(super) label: FileLabel,
     kind: RowFormat,
     /// Decompressed copy of a compressed file, deleted when dropped.
@@ -157,7 +157,7 @@ impl SetFile {
 }
 
 /// True for a ZIP file, by its name.
-pub(crate) fn is_zip_file(path: &Path) -> bool {
+pub fn is_zip_file(path: &Path) -> bool {
     path.is_file() && extension(path) == "zip"
 }
 
@@ -167,7 +167,7 @@ fn extension(path: &Path) -> String {
 }
 
 /// Refuses a Git LFS pointer, the placeholder of a file that was not downloaded.
-pub(crate) fn refuse_lfs_pointer(path: &Path) -> Result<()> {
+pub fn refuse_lfs_pointer(path: &Path) -> Result<()> {
     const POINTER: &[u8] = b"version https://git-lfs.github.com/spec";
     let mut file = files::open(path).map_err(|e| Error::file(path, "read", e))?;
     let mut head = [0; POINTER.len()];

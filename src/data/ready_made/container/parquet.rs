@@ -22,10 +22,10 @@ use serde_json::Value;
 
 use super::super::cells::{MAX_ROWS, PathStep, RowPlace, SetRows, parse_list, too_many_rows};
 use super::json::MAX_ROW_BYTES;
-use crate::data::ready_made::cells::Cell;
-use crate::error::{Error, Result};
-use crate::files::{self, guarded};
-use crate::types::shell_word;
+use crate::ready_made::cells::Cell;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{self, guarded};
+use darkqa_base::types::shell_word;
 
 /// Rows that are decoded together; the images of all of them are in memory at once.
 const BATCH_ROWS: usize = 8;

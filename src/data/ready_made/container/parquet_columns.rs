@@ -11,9 +11,9 @@ use parquet::file::serialized_reader::SerializedPageReader;
 use super::super::cells::PathStep;
 use super::parquet::{Footer, bytes, check_codecs, corrupt_file, open};
 use super::refuse_lfs_pointer;
-use crate::error::{Error, Result};
-use crate::files::guarded;
-use crate::types::text::excerpt;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::guarded;
+use darkqa_base::types::text::excerpt;
 
 /// Rows that are decoded together (chosen).
 const BATCH_ROWS: usize = 8192;
@@ -26,7 +26,7 @@ const MAX_TEXT_CHARS: usize = 2_000;
 
 /// A Parquet file of which single columns are read. Other columns, whatever their size, are not decoded.
 #[derive(Debug)]
-pub(crate) struct ParquetColumns {
+pub struct ParquetColumns {
     path: PathBuf,
     footer: Footer,
     metadata: Arc<ParquetMetaData>,
@@ -34,13 +34,13 @@ pub(crate) struct ParquetColumns {
 
 /// Consecutive rows of a row group.
 #[derive(Debug)]
-pub(crate) struct ColumnBatch {
+pub struct ColumnBatch {
     /// Number of the row group.
-    pub(crate) group: usize,
+    pub group: usize,
     /// Index in the row group of the first row.
-    pub(crate) first_row: usize,
+    pub first_row: usize,
     /// Values of each requested column, one a row; NaN for a null.
-    pub(crate) numbers: Vec<Vec<f64>>,
+    pub numbers: Vec<Vec<f64>>,
 }
 
 impl ParquetColumns {
@@ -48,7 +48,7 @@ impl ParquetColumns {
     ///
     /// # Errors
     /// If the file cannot be read, is not a whole Parquet file, or has too many rows.
-    pub(crate) fn open(path: &Path) -> Result<Self> {
+    pub fn open(path: &Path) -> Result<Self> {
         refuse_lfs_pointer(path)?;
         let footer = Footer::default();
         let metadata = footer.metadata(path)?;
@@ -66,7 +66,7 @@ impl ParquetColumns {
     }
 
     /// Names of the columns, in their order.
-    pub(crate) fn names(&self) -> Vec<&str> {
+    pub fn names(&self) -> Vec<&str> {
         let schema = self.metadata.file_metadata().schema();
         schema.is_group().then(|| schema.get_fields().iter().map(|field| field.name())).into_iter().flatten().collect()
     }
@@ -75,7 +75,7 @@ impl ParquetColumns {
     ///
     /// # Errors
     /// If the file lacks a column or is damaged, or `add` fails.
-    pub(crate) fn numbers(&self, columns: &[&str], mut add: impl FnMut(ColumnBatch) -> Result<()>) -> Result<()> {
+    pub fn numbers(&self, columns: &[&str], mut add: impl FnMut(ColumnBatch) -> Result<()>) -> Result<()> {
         for group in 0..self.metadata.row_groups().len() {
             let mut readers =
                 columns.iter().map(|column| self.reader(group, column)).collect::<Result<Vec<LeafReader>>>()?;
@@ -104,7 +104,7 @@ impl ParquetColumns {
     ///
     /// # Errors
     /// If the file lacks the column, has more than `max_rows` rows, or is damaged.
-    pub(crate) fn texts(&self, column: &str, max_rows: usize) -> Result<Vec<Option<String>>> {
+    pub fn texts(&self, column: &str, max_rows: usize) -> Result<Vec<Option<String>>> {
         let mut texts = Vec::new();
         for group in 0..self.metadata.row_groups().len() {
             let mut reader = self.reader(group, column)?;
@@ -128,7 +128,7 @@ impl ParquetColumns {
     ///
     /// # Errors
     /// If the file lacks the column or is damaged, or the bytes are null.
-    pub(crate) fn image(&self, column: &str, group: usize, row: usize) -> Result<Vec<u8>> {
+    pub fn image(&self, column: &str, group: usize, row: usize) -> Result<Vec<u8>> {
         let field = [PathStep::Field("bytes".to_owned())];
         bytes(&self.path, &self.footer, group, row, column, &field)
     }

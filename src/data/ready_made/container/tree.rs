@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use super::SetFile;
 use super::archive::Archive;
-use crate::data::root::{Location, Root};
-use crate::error::{Error, Result};
-use crate::files;
+use crate::root::{Location, Root};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
 
 /// A folder or a ZIP file. Paths are relative to it.
 pub(super) enum Tree {
@@ -89,7 +89,7 @@ impl Tree {
 ///
 /// # Errors
 /// If the cache does not name a snapshot.
-pub(crate) fn cached_snapshot(place: &Path) -> Result<(PathBuf, Option<PathBuf>)> {
+pub fn cached_snapshot(place: &Path) -> Result<(PathBuf, Option<PathBuf>)> {
     let canonical = place.canonicalize().unwrap_or_else(|_| place.to_owned());
     if !(is_cached_repository(&canonical) && place.join("snapshots").is_dir()) {
         let repository = canonical.ancestors().nth(2).filter(|path| is_cached_repository(path));

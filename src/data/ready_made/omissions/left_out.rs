@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::skip_bad::SkipBad;
-use crate::data::ready_made::settings::{SetArgs, SeveralImages};
+use crate::ready_made::settings::{SetArgs, SeveralImages};
 
 /// Reason why a row is not asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -131,7 +131,7 @@ impl Omissions {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::ready_made::settings::LeaveOut;
+    use crate::ready_made::settings::LeaveOut;
 
     #[test]
     fn rows_are_left_out_only_with_flags() {

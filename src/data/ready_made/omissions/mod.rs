@@ -10,11 +10,11 @@ use std::collections::{BTreeSet, HashMap};
 use super::cells::SetRows;
 use super::choices::SetQuestion;
 use super::settings::SetArgs;
-use crate::types::Digest;
+use darkqa_base::types::Digest;
 
 pub(super) use left_out::{Omissions, RowOmission};
 
-pub(crate) use skip_bad::SkipBad;
+pub use skip_bad::SkipBad;
 
 /// Pairs of indices of questions with equal digests and different answers. Every contradicted question is in at least
 /// one pair.

@@ -18,7 +18,7 @@ impl SkipBad {
     ///
     /// # Errors
     /// If their share is too large. The error names the flag that allows it.
-    pub(crate) fn check(self, bad: usize, all: usize, noun: &str, first: &str) -> Result<(), String> {
+    pub fn check(self, bad: usize, all: usize, noun: &str, first: &str) -> Result<(), String> {
         if percent(bad, all) <= self.max_percent {
             return Ok(());
         }
@@ -31,7 +31,7 @@ impl SkipBad {
     }
 
     /// The flag as typed by the user.
-    pub(crate) fn flag(self) -> String {
+    pub fn flag(self) -> String {
         if self == Self::default() {
             return "--skip bad".to_owned();
         }
@@ -39,7 +39,7 @@ impl SkipBad {
     }
 
     /// The default share, or the lowest larger one in whole percent that allows `bad` of `all`.
-    pub(crate) fn allowing(bad: usize, all: usize) -> Self {
+    pub fn allowing(bad: usize, all: usize) -> Self {
         Self { max_percent: percent(bad, all).ceil().max(DEFAULT_PERCENT) }
     }
 }

@@ -6,17 +6,17 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::images::{CellPart, EmbeddedImage, ImageForm, RowImage, images};
-use crate::data::Root;
-use crate::data::openeqa::ImageSource;
-use crate::data::ready_made::cells::{Cell, DroppedFile, MAX_NAME_LENGTH, PathStep, SetRows};
-use crate::data::ready_made::choices::SetQuestion;
-use crate::data::ready_made::columns::map::{ColumnRole, map_flag};
-use crate::data::ready_made::columns::{ColumnRoles, SetColumn};
-use crate::data::ready_made::container::{Archive, SetFile};
-use crate::data::ready_made::settings::SeveralImages;
-use crate::error::{Error, Result};
-use crate::types::text::excerpt;
-use crate::types::{Digest, FrameId};
+use crate::Root;
+use crate::openeqa::ImageSource;
+use crate::ready_made::cells::{Cell, DroppedFile, MAX_NAME_LENGTH, PathStep, SetRows};
+use crate::ready_made::choices::SetQuestion;
+use crate::ready_made::columns::map::{ColumnRole, map_flag};
+use crate::ready_made::columns::{ColumnRoles, SetColumn};
+use crate::ready_made::container::{Archive, SetFile};
+use crate::ready_made::settings::SeveralImages;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::text::excerpt;
+use darkqa_base::types::{Digest, FrameId};
 
 /// Image of a question.
 pub(super) enum LocatedImage {

@@ -5,15 +5,15 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use super::frames::{LocatedImage, SetFrames};
-use crate::data::ready_made::cells::SetRows;
-use crate::data::ready_made::choices::{SetQuestion, is_native_format};
-use crate::data::ready_made::columns::SetColumn;
-use crate::data::ready_made::columns::map::{ColumnMap, ColumnRole, map_flag};
-use crate::data::ready_made::omissions::find_contradictions;
-use crate::data::ready_made::summary::count;
-use crate::error::{Error, Result};
-use crate::files;
-use crate::types::{Digest, FrameId, QuestionId};
+use crate::ready_made::cells::SetRows;
+use crate::ready_made::choices::{SetQuestion, is_native_format};
+use crate::ready_made::columns::SetColumn;
+use crate::ready_made::columns::map::{ColumnMap, ColumnRole, map_flag};
+use crate::ready_made::omissions::find_contradictions;
+use crate::ready_made::summary::count;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::{Digest, FrameId, QuestionId};
 
 /// Ids of the questions of a set.
 #[derive(Debug)]

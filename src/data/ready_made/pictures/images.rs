@@ -6,16 +6,16 @@ use std::sync::{Arc, LazyLock};
 
 use regex::{Captures, Regex};
 
-use crate::data::ready_made::cells::{
+use crate::ready_made::cells::{
     Cell, DroppedFile, MAX_NAME_LENGTH, PathStep, Row, RowPlace, decode_base64, parse_list,
 };
-use crate::data::ready_made::columns::{ColumnRoles, ImageColumns, SetColumn};
-use crate::data::ready_made::container::SetFile;
-use crate::error::{Error, Result};
-use crate::pictures::image_file::format::FileFormat;
-use crate::pictures::{DecodeRule, ImageFile};
-use crate::types::text::excerpt;
-use crate::types::text::image_mark::mark;
+use crate::ready_made::columns::{ColumnRoles, ImageColumns, SetColumn};
+use crate::ready_made::container::SetFile;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::text::excerpt;
+use darkqa_base::types::text::image_mark::mark;
+use darkqa_pictures::image_file::format::FileFormat;
+use darkqa_pictures::{DecodeRule, ImageFile};
 
 /// Reference to an image of a row.
 #[derive(Debug, Clone)]
@@ -150,7 +150,7 @@ fn add_text_images(text: &str, column: usize, steps: &[PathStep], found: &mut Ve
 /// Location of an image inside a table. The image is read when needed, so that a large file is never in memory as a
 /// whole.
 #[derive(Debug, Clone)]
-pub(crate) struct EmbeddedImage {
+pub struct EmbeddedImage {
     pub(super) file: Arc<SetFile>,
     pub(super) row: RowPlace,
     pub(super) part: Arc<CellPart>,
@@ -167,7 +167,7 @@ pub(super) struct CellPart {
 
 impl EmbeddedImage {
     /// Name of the image format, or `other`.
-    pub(crate) fn format(&self) -> &'static str {
+    pub fn format(&self) -> &'static str {
         self.facts.format.map_or("other", FileFormat::name)
     }
 
@@ -175,7 +175,7 @@ impl EmbeddedImage {
     ///
     /// # Errors
     /// If the table cannot be read, or has changed since it was opened.
-    pub(crate) fn read_image(&self, rule: DecodeRule) -> Result<ImageFile> {
+    pub fn read_image(&self, rule: DecodeRule) -> Result<ImageFile> {
         let place = format!("{}, {}", self.file.label.path.display(), self.row);
         let value = self.file.value(&self.row, &self.part.column, &self.part.steps)?;
         let bytes = std::str::from_utf8(&value).ok().and_then(decode_base64).unwrap_or(value);

@@ -6,8 +6,8 @@ use serde_json::{Map, Value, json};
 
 use super::fixture::{base64, bytes, row, set};
 use super::{open, refusal};
-use crate::data::ready_made::SetArgs;
-use crate::types::FrameId;
+use crate::ready_made::SetArgs;
+use darkqa_base::types::FrameId;
 
 /// Values of unexpected types.
 fn damages() -> Vec<Value> {
@@ -128,7 +128,7 @@ fn unusable_images_are_left_out_with_skip_bad() {
         let whole = base64(1);
         let rows: Vec<_> = (0..40).map(|id| question(id, if id == 7 { image } else { &whole })).collect();
         let (_folder, path) = set("set.tsv", &rows);
-        let skip = SetArgs { bad: Some(crate::data::SkipBad::default()), ..SetArgs::default() };
+        let skip = SetArgs { bad: Some(crate::SkipBad::default()), ..SetArgs::default() };
         let dataset = open(&path, &skip).unwrap();
         assert_eq!(dataset.questions().len(), 39, "{image}");
     }
@@ -142,7 +142,7 @@ fn unusable_images_are_left_out_with_skip_bad() {
 #[test]
 fn skip_bad_is_not_advised_twice() {
     let (_folder, path) = set("set.tsv", &[question(1, &"QUJD".repeat(2000)[1..])]);
-    let skip = SetArgs { bad: Some(crate::data::SkipBad::default()), ..SetArgs::default() };
+    let skip = SetArgs { bad: Some(crate::SkipBad::default()), ..SetArgs::default() };
     let problem = refusal(&path, &skip);
     assert!(!problem.contains("leaves such rows out"), "{problem}");
 }
@@ -200,7 +200,7 @@ fn backslash_in_path_is_named() {
 fn message_names_the_file_once() {
     let broken = question(1, "none.png");
     let other = row(json!({"id": 2, "question": "?", "options": ["x", "y"], "answer": "z", "image": base64(1)}));
-    let skip = SetArgs { bad: Some(crate::data::SkipBad::default()), ..SetArgs::default() };
+    let skip = SetArgs { bad: Some(crate::SkipBad::default()), ..SetArgs::default() };
     for bad in [broken, other] {
         let (folder, path) = set("set.json", &[question(3, &base64(2)), bad]);
         for place in [&path, folder.path()] {

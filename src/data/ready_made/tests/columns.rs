@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::fixture::{base64, row, set};
 use super::{map, open, read, refusal};
-use crate::data::ready_made::SetArgs;
+use crate::ready_made::SetArgs;
 
 fn with(rows: Vec<Value>) -> (tempfile::TempDir, std::path::PathBuf) {
     let rows: Vec<_> = rows.into_iter().map(row).collect();
@@ -12,7 +12,7 @@ fn with(rows: Vec<Value>) -> (tempfile::TempDir, std::path::PathBuf) {
 }
 
 fn skipping() -> SetArgs {
-    SetArgs { bad: Some(crate::data::SkipBad::default()), ..SetArgs::default() }
+    SetArgs { bad: Some(crate::SkipBad::default()), ..SetArgs::default() }
 }
 
 /// Forty rows with the answer x, and a label made from the number of the row.

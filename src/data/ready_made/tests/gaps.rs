@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 use super::super::settings::LeaveOut;
 use super::fixture::{base64, row, set, write};
 use super::{open, read, refusal};
-use crate::data::ready_made::SetArgs;
+use crate::ready_made::SetArgs;
 
 fn with(rows: Vec<Value>) -> (tempfile::TempDir, std::path::PathBuf) {
     let rows: Vec<_> = rows.into_iter().map(row).collect();
@@ -13,7 +13,7 @@ fn with(rows: Vec<Value>) -> (tempfile::TempDir, std::path::PathBuf) {
 }
 
 fn skipping() -> SetArgs {
-    SetArgs { bad: Some(crate::data::SkipBad::default()), open: Some(LeaveOut::Skip), ..SetArgs::default() }
+    SetArgs { bad: Some(crate::SkipBad::default()), open: Some(LeaveOut::Skip), ..SetArgs::default() }
 }
 
 fn question_with_answer(answer: i64) -> Value {
@@ -101,7 +101,7 @@ fn preset_config_is_ignored_for_a_single_file() {
     let (_folder, path) = with(vec![
         json!({"question": "?", "options": "['x', 'y']", "answer": "A", "image_1": base64(1), "image_2": null}),
     ]);
-    let place = crate::data::parse_data_source(&format!("mmmu:{}", path.display())).unwrap();
+    let place = crate::parse_data_source(&format!("mmmu:{}", path.display())).unwrap();
     let dataset = place.open(None, &SetArgs::default()).unwrap();
     assert_eq!(dataset.questions().len(), 1);
 }

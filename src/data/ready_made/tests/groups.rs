@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use super::super::settings::LeaveOut;
 use super::fixture::{png, row, set};
 use super::{map, open, refusal};
-use crate::data::{Dataset, SetArgs};
+use crate::{Dataset, SetArgs};
 
 /// Six rows about three images, with numbers from 1 and two columns that form a group together. The last row is an open
 /// question.
@@ -125,7 +125,7 @@ fn stored_questions_keep_their_groups() {
 }
 
 fn open_preset(name: &str, path: &std::path::Path, args: &SetArgs) -> Dataset {
-    let place = crate::data::parse_data_source(&format!("{name}:{}", path.display())).unwrap();
+    let place = crate::parse_data_source(&format!("{name}:{}", path.display())).unwrap();
     place.open(None, args).unwrap()
 }
 

@@ -10,9 +10,9 @@ use serde_json::{Map, Value, json};
 use super::super::settings::LeaveOut;
 use super::fixture::{base64, png, row, set};
 use super::{open, read, refusal};
-use crate::data::ready_made::SetArgs;
-use crate::data::{DataSource, Dataset};
-use crate::error::Result;
+use crate::ready_made::SetArgs;
+use crate::{DataSource, Dataset};
+use darkqa_base::error::Result;
 
 fn question(fields: Value) -> Value {
     let mut row = row(fields);
@@ -151,7 +151,7 @@ fn equal_rows_with_different_answers_are_refused() {
             && problem.contains("line 2 (\"y\") ask the same of the same image, and their answers differ; --skip bad"),
         "{problem}"
     );
-    let skip = SetArgs { bad: Some(crate::data::SkipBad::default()), ..SetArgs::default() };
+    let skip = SetArgs { bad: Some(crate::SkipBad::default()), ..SetArgs::default() };
     let dataset = open(&path, &skip).unwrap();
     assert_eq!(dataset.questions().len(), 38);
     assert!(dataset.summary().join("\n").contains("left out: 2 of 40 rows"));
@@ -184,7 +184,7 @@ fn rows_ending_with(same: &Value, last: [(&Value, &str); 3]) -> Vec<Map<String, 
 
 #[test]
 fn contradictions_are_found_with_ids_too() {
-    let skip = SetArgs { bad: Some(crate::data::SkipBad::default()), ..SetArgs::default() };
+    let skip = SetArgs { bad: Some(crate::SkipBad::default()), ..SetArgs::default() };
     let strict = SetArgs::default();
     // Images of the rows 39 to 41, in cells and in files.
     for [same, other] in [[json!(base64(1)), json!(base64(2))], [json!("a.png"), json!("b.png")]] {

@@ -8,9 +8,9 @@ use serde_json::json;
 
 use super::fixture::{base64, row, set};
 use super::{open, read, refusal};
-use crate::data::Dataset;
-use crate::data::ready_made::SetArgs;
-use crate::error::Result;
+use crate::Dataset;
+use crate::ready_made::SetArgs;
+use darkqa_base::error::Result;
 
 fn file(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::fixture::{base64, row, set};
 use super::{Read, map, open, read, refusal};
-use crate::data::ready_made::SetArgs;
+use crate::ready_made::SetArgs;
 
 fn asked(question: &str, answer: impl Into<Value>) -> Value {
     let answer = answer.into();
@@ -131,6 +131,6 @@ fn text_list_with_one_image_is_one_image() {
         "set.tsv",
         &[row(json!({"question": "?", "options": "['x', 'y']", "answer": "x", "image": "['1.png', '2.png']"}))],
     );
-    let args = SetArgs { bad: Some(crate::data::SkipBad::default()), ..SetArgs::default() };
+    let args = SetArgs { bad: Some(crate::SkipBad::default()), ..SetArgs::default() };
     assert!(refusal(&path, &args).contains("1 of 1 rows show 2 images"));
 }

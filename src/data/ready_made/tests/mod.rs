@@ -17,8 +17,8 @@ mod user_shapes;
 use std::path::Path;
 
 use super::SetArgs;
-use crate::data::{DataSource, Dataset, Picture};
-use crate::error::Result;
+use crate::{DataSource, Dataset, Picture};
+use darkqa_base::error::Result;
 
 /// Opens the set at a path with these flags.
 fn open(path: &Path, args: &SetArgs) -> Result<Dataset> {

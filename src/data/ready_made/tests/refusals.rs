@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::fixture::{base64, row, set};
 use super::{map, open, read, refusal};
-use crate::data::ready_made::SetArgs;
+use crate::ready_made::SetArgs;
 
 /// A set with these fields in each row, and a question and an image.
 fn with(fields: &[Value]) -> (tempfile::TempDir, std::path::PathBuf) {
@@ -119,7 +119,7 @@ fn bad_rows_are_left_out_up_to_a_share() {
         problem.contains("1 of 40 rows are broken; the first: ") && problem.contains("object 40: the answer \"z\""),
         "{problem}"
     );
-    let skip = SetArgs { bad: Some(crate::data::SkipBad::default()), ..SetArgs::default() };
+    let skip = SetArgs { bad: Some(crate::SkipBad::default()), ..SetArgs::default() };
     assert_eq!(open(&path, &skip).unwrap().questions().len(), 39);
     let (_folder, path) = with(&rows[30..]);
     let problem = refusal(&path, &skip);

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 use super::fixture::{png, row, set};
 use super::{map, open, refusal};
-use crate::data::{DataSource, Dataset, SetArgs};
+use crate::{DataSource, Dataset, SetArgs};
 
 /// Six rows about three images, with a column of scenes.
 fn rows(column: &str, scenes: [Value; 6]) -> Vec<Map<String, Value>> {

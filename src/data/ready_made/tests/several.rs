@@ -104,7 +104,7 @@ fn mark_without_image_makes_a_bad_row() {
             && problem.contains("\"<image 3>\" is not an image of the row, which shows 2"),
         "{problem}"
     );
-    let args = SetArgs { bad: Some(crate::data::SkipBad::default()), ..send() };
+    let args = SetArgs { bad: Some(crate::SkipBad::default()), ..send() };
     let summary = open(&path, &args).unwrap().summary().join("\n");
     assert!(summary.contains("2 questions show 2 images, all in one request"), "{summary}");
 }

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use super::super::settings::{LeaveOut, SeveralImages};
 use super::fixture::{base64, bytes, png, row, set, set_with_features, write};
 use super::{Read, digests, expected, map, open, read};
-use crate::data::ready_made::SetArgs;
+use crate::ready_made::SetArgs;
 
 const FORMS: [&str; 5] = ["tsv", "csv", "json", "jsonl", "parquet"];
 
@@ -217,7 +217,7 @@ fn image_folder_and_image_files_are_read() {
     fs::create_dir(folder.path().join("MMVP Images")).unwrap();
     fs::write(folder.path().join("MMVP Images/3.jpg"), png(6)).unwrap();
     assert_eq!(read(&open(&path, &map("image=MMVP Images/{Index}.jpg")).unwrap())[0].5, 6);
-    let known = crate::data::parse_data_source(&format!("mmvp:{}", path.display())).unwrap();
+    let known = crate::parse_data_source(&format!("mmvp:{}", path.display())).unwrap();
     let dataset = known.open(None, &SetArgs::default()).unwrap();
     assert!(dataset.summary().join("\n").contains("read by the rules of MMVP: Tong et al."));
     assert_eq!(dataset.questions().len(), 1);

@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 
 use super::fixture::{base64, bytes, png, row, set};
 use super::{map, open, read, refusal};
-use crate::data::ready_made::SetArgs;
+use crate::ready_made::SetArgs;
 
 /// The `--map` flag in an error message, as a user pastes it.
 fn map_in(problem: &str) -> SetArgs {

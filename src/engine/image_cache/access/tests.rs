@@ -1,7 +1,7 @@
 use std::fs::File;
 
 use super::*;
-use crate::engine::image_cache::{EntryFacts, EntryType, Shown};
+use crate::image_cache::{EntryFacts, EntryType, Shown};
 
 fn key(name: &str) -> Key {
     Key::from_recipe(&[name]).unwrap()

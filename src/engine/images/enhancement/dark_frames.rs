@@ -3,12 +3,12 @@
 
 use std::collections::BTreeSet;
 
-use crate::engine::images::frame_work::FrameWork;
-use crate::engine::images::frames::Source;
-use crate::engine::images::timings::ImageSteps;
-use crate::engine::images::trials::SourcePlan;
-use crate::error::Result;
-use crate::types::{Condition, EnhancerName, Rgb, Severity};
+use crate::images::frame_work::FrameWork;
+use crate::images::frames::Source;
+use crate::images::timings::ImageSteps;
+use crate::images::trials::SourcePlan;
+use darkqa_base::error::Result;
+use darkqa_base::types::{Condition, EnhancerName, Rgb, Severity};
 use darkqa_enhance::{DARK, FRAMES, brightness, shows_nothing};
 use darkqa_light::expose;
 
@@ -112,14 +112,14 @@ pub(crate) fn dark_frames(steps: ImageSteps<'_>, frames: &DarkFrames<'_>) -> Res
 
 /// Up to [`FRAMES`] images to probe an enhancer without a plan: the dark ones of `images`, then darkened copies. Images
 /// that show nothing are left out.
-pub(crate) fn dark_or_darkened(images: &[Rgb]) -> Vec<Rgb> {
+pub fn dark_or_darkened(images: &[Rgb]) -> Vec<Rgb> {
     let dark = images.iter().filter(|image| brightness(image) <= DARK);
     let darkened = DROPS.iter().flat_map(|drop| images.iter().map(|image| expose(image, *drop)));
     dark.cloned().chain(darkened).filter(|image| !shows_nothing(image)).take(FRAMES).collect()
 }
 
 /// Up to `max` evenly spaced indices below `count`.
-pub(crate) fn evenly_spaced_indices(count: usize, max: usize) -> Vec<usize> {
+pub fn evenly_spaced_indices(count: usize, max: usize) -> Vec<usize> {
     let taken = count.min(max);
     (0..taken).map(|i| (2 * i + 1) * count / (2 * taken)).collect()
 }

@@ -7,17 +7,17 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use crate::data::inputs::stem;
-use crate::engine::images::frames::SourceFrame;
-use crate::engine::images::recipes::ImageRecipe;
-use crate::engine::images::stored::{Sidecar, differing_fields};
-use crate::error::{Error, Result};
-use crate::files;
-use crate::pictures::image_file::format::FileFormat;
-use crate::pictures::{DecodeRule, ImageFile};
-use crate::report::text::words::first_names;
-use crate::types::{Condition, DepthNote, Digest, EnhancerName, FrameId, Rgb};
+use crate::images::frames::SourceFrame;
+use crate::images::recipes::ImageRecipe;
+use crate::images::stored::{Sidecar, differing_fields};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files;
+use darkqa_base::types::{Condition, DepthNote, Digest, EnhancerName, FrameId, Rgb};
+use darkqa_data::inputs::stem;
 use darkqa_enhance::{EnhancedFolder, ImageUse, Implausible, Usage};
+use darkqa_pictures::image_file::format::FileFormat;
+use darkqa_pictures::{DecodeRule, ImageFile};
+use darkqa_report::text::words::first_names;
 
 /// Maximum number of files named per fault in a message; chosen.
 const NAMED: usize = 4;
@@ -28,7 +28,7 @@ const MAX_DEPTH: usize = 16;
 /// The images of one folder. Each has the name of its dark image, and next to it the JSON file that `synthesize` wrote
 /// for the dark image.
 #[derive(Debug)]
-pub(crate) struct EnhancedImages {
+pub struct EnhancedImages {
     name: EnhancerName,
     folder: PathBuf,
     /// Image files by their path below the folder.
@@ -45,10 +45,10 @@ struct EnhancedFile {
 }
 
 /// A dark image of a run with its recipe, as `synthesize` would write it.
-pub(crate) struct DarkImage<'a> {
-    pub(crate) frame: &'a SourceFrame,
-    pub(crate) condition: &'a Condition,
-    pub(crate) recipe: ImageRecipe,
+pub struct DarkImage<'a> {
+    pub frame: &'a SourceFrame,
+    pub condition: &'a Condition,
+    pub recipe: ImageRecipe,
 }
 
 /// A reason why an image cannot be used. Images with the same `words` are reported together.
@@ -69,7 +69,7 @@ impl EnhancedImages {
     ///
     /// # Errors
     /// If a folder cannot be read or has no image, or a name is used twice.
-    pub(crate) fn open_all<'a>(
+    pub fn open_all<'a>(
         folders: &[EnhancedFolder],
         models: impl IntoIterator<Item = &'a EnhancerName>,
     ) -> Result<Vec<Self>> {
@@ -98,22 +98,22 @@ impl EnhancedImages {
         Ok(Self { name: args.name.clone(), folder: args.folder.clone(), files, usage: Usage::for_external() })
     }
 
-    pub(crate) fn name(&self) -> &EnhancerName {
+    pub fn name(&self) -> &EnhancerName {
         &self.name
     }
 
     /// The usage note, which every read image extends.
-    pub(crate) fn usage(&self) -> &Usage {
+    pub fn usage(&self) -> &Usage {
         &self.usage
     }
 
     /// Path of the folder, as given by the flag.
-    pub(crate) fn folder(&self) -> &Path {
+    pub fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// Digest of the names and contents of all images.
-    pub(crate) fn digest(&self) -> Digest {
+    pub fn digest(&self) -> Digest {
         let parts = self.files.iter().flat_map(|(path, file)| [path.as_bytes(), file.digest.as_bytes()]);
         Digest::from_parts(std::iter::once(&b"darkqa.enhanced-folder/1"[..]).chain(parts))
     }
@@ -122,7 +122,7 @@ impl EnhancedImages {
     ///
     /// # Errors
     /// If it is missing.
-    pub(crate) fn image_digest(&self, frame: &FrameId, condition: &Condition) -> Result<Digest> {
+    pub fn image_digest(&self, frame: &FrameId, condition: &Condition) -> Result<Digest> {
         let path = path(frame, condition)?;
         let file = self.files.get(&path).ok_or_else(|| Error::data(self.folder.join(&path).display(), "missing"))?;
         Ok(file.digest)
@@ -132,7 +132,7 @@ impl EnhancedImages {
     ///
     /// # Errors
     /// If the file was changed during the run, cannot be decoded, or has another size than its input.
-    pub(crate) fn image(
+    pub fn image(
         &self,
         degraded: &Rgb,
         frame: &FrameId,
@@ -160,7 +160,7 @@ impl EnhancedImages {
     ///
     /// # Errors
     /// If an image cannot be used, or all images are identical to the dark images.
-    pub(crate) fn check(&self, dark: &[DarkImage<'_>]) -> Result<()> {
+    pub fn check(&self, dark: &[DarkImage<'_>]) -> Result<()> {
         let mut faults: BTreeMap<&str, Vec<String>> = BTreeMap::new();
         let mut wanted = BTreeSet::new();
         let mut unchanged = 0;

@@ -8,9 +8,9 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 use clap::Args;
 
-use crate::engine::images::workers::ThreadArgs;
-use crate::error::{Error, Result};
-use crate::types::{Digest, EnhancerName, Rgb};
+use crate::images::workers::ThreadArgs;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::{Digest, EnhancerName, Rgb};
 use darkqa_enhance::{
     Enhancer, ImageUse, Implausible, LoadLimits, ModelFile, ProbeArgs, ProbeFindings, Runtime, RuntimeArgs, SizeArgs,
     Stopper, Usage,
@@ -18,7 +18,7 @@ use darkqa_enhance::{
 
 /// Flags for running enhancement models.
 #[derive(Debug, Clone, Default, Args)]
-pub(crate) struct EnhancerRunArgs {
+pub struct EnhancerRunArgs {
     /// Size of the images and tiles that models take.
     #[command(flatten)]
     pub size: SizeArgs,
@@ -38,7 +38,7 @@ impl EnhancerRunArgs {
     ///
     /// # Errors
     /// If ONNX Runtime is not found, or the file is not a model that it can run.
-    pub(crate) fn open(&self, file: ModelFile) -> Result<Enhancer> {
+    pub fn open(&self, file: ModelFile) -> Result<Enhancer> {
         let runtime = self.runtime.search().open()?;
         let limits = LoadLimits { time: self.runtime.llie_timeout, memory: self.runtime.memory_limit() };
         let enhancer = Enhancer::open_within(file, &runtime, self.threads.threads, limits)?
@@ -53,7 +53,7 @@ impl EnhancerRunArgs {
 ///
 /// # Errors
 /// If a file cannot be read, or two models have the same name.
-pub(crate) fn read_models(models: &[PathBuf]) -> Result<Vec<ModelFile>> {
+pub fn read_models(models: &[PathBuf]) -> Result<Vec<ModelFile>> {
     let mut enhancers: Vec<ModelFile> = Vec::new();
     for path in models {
         let file = ModelFile::read(path)?;
@@ -68,7 +68,7 @@ pub(crate) fn read_models(models: &[PathBuf]) -> Result<Vec<ModelFile>> {
 
 /// An enhancement model of a command.
 #[expect(clippy::large_enum_variant, reason = "few are alive at a time")]
-pub(crate) enum Model {
+pub enum Model {
     /// Its file, without a session.
     File(ModelFile),
     /// Its open session, with the digest of its file and sidecar ([`ModelFile::probe_digest`]).
@@ -76,7 +76,7 @@ pub(crate) enum Model {
 }
 
 impl Model {
-    pub(crate) fn name(&self) -> &EnhancerName {
+    pub fn name(&self) -> &EnhancerName {
         match self {
             Self::File(file) => file.name(),
             Self::Open(enhancer, _) => enhancer.name(),
@@ -84,7 +84,7 @@ impl Model {
     }
 
     /// Path of the file, for messages.
-    pub(crate) fn path(&self) -> &Path {
+    pub fn path(&self) -> &Path {
         match self {
             Self::File(file) => file.path(),
             Self::Open(enhancer, _) => enhancer.path(),
@@ -95,7 +95,7 @@ impl Model {
     ///
     /// # Errors
     /// If a number of the sidecar is infinite or NaN.
-    pub(crate) fn stated(&self) -> Result<Digest> {
+    pub fn stated(&self) -> Result<Digest> {
         match self {
             Self::File(file) => file.probe_digest(),
             Self::Open(_, stated) => Ok(*stated),
@@ -106,7 +106,7 @@ impl Model {
     ///
     /// # Errors
     /// If ONNX Runtime is not found, or the file is not a model that it can run.
-    pub(crate) fn open(self, settings: &EnhancerRunArgs) -> Result<Enhancer> {
+    pub fn open(self, settings: &EnhancerRunArgs) -> Result<Enhancer> {
         match self {
             Self::File(file) => settings.open(file),
             Self::Open(enhancer, _) => Ok(enhancer),
@@ -115,7 +115,7 @@ impl Model {
 }
 
 /// The enhancement models of a command, loaded or not.
-pub(crate) struct EnhancerModels<'a> {
+pub struct EnhancerModels<'a> {
     settings: &'a EnhancerRunArgs,
     models: Vec<Model>,
     /// ONNX Runtime; `None` if it is not open.
@@ -124,7 +124,7 @@ pub(crate) struct EnhancerModels<'a> {
 
 impl<'a> EnhancerModels<'a> {
     /// The models in these files, not loaded yet.
-    pub(crate) fn from_files(files: Vec<ModelFile>, settings: &'a EnhancerRunArgs) -> Self {
+    pub fn from_files(files: Vec<ModelFile>, settings: &'a EnhancerRunArgs) -> Self {
         Self { settings, models: files.into_iter().map(Model::File).collect(), runtime: None }
     }
 
@@ -132,7 +132,7 @@ impl<'a> EnhancerModels<'a> {
     ///
     /// # Errors
     /// If ONNX Runtime is not found, or a file is not a model that it can run.
-    pub(crate) fn load(files: Vec<ModelFile>, settings: &'a EnhancerRunArgs) -> Result<Self> {
+    pub fn load(files: Vec<ModelFile>, settings: &'a EnhancerRunArgs) -> Result<Self> {
         let mut models = Self::from_files(files, settings);
         models.open()?;
         Ok(models)
@@ -142,7 +142,7 @@ impl<'a> EnhancerModels<'a> {
     ///
     /// # Errors
     /// If ONNX Runtime is not found, or a file is not a model that it can run.
-    pub(crate) fn open(&mut self) -> Result<()> {
+    pub fn open(&mut self) -> Result<()> {
         self.open_runtime()?;
         self.models = std::mem::take(&mut self.models)
             .into_iter()
@@ -161,7 +161,7 @@ impl<'a> EnhancerModels<'a> {
     ///
     /// # Errors
     /// If it is not found.
-    pub(crate) fn open_runtime(&mut self) -> Result<()> {
+    pub fn open_runtime(&mut self) -> Result<()> {
         if self.runtime.is_none() && !self.models.is_empty() {
             self.runtime = Some(self.settings.runtime.search().open()?);
         }
@@ -172,7 +172,7 @@ impl<'a> EnhancerModels<'a> {
     ///
     /// # Errors
     /// See [`Self::open`].
-    pub(crate) fn take(&mut self) -> Result<Vec<Enhancer>> {
+    pub fn take(&mut self) -> Result<Vec<Enhancer>> {
         self.take_models()?.into_iter().map(|model| model.open(self.settings)).collect()
     }
 
@@ -180,18 +180,18 @@ impl<'a> EnhancerModels<'a> {
     ///
     /// # Errors
     /// If it is not found.
-    pub(crate) fn take_models(&mut self) -> Result<Vec<Model>> {
+    pub fn take_models(&mut self) -> Result<Vec<Model>> {
         self.open_runtime()?;
         Ok(std::mem::take(&mut self.models))
     }
 
     /// The models, loaded or not.
-    pub(crate) fn models(&self) -> &[Model] {
+    pub fn models(&self) -> &[Model] {
         &self.models
     }
 
     /// Name and version of ONNX Runtime for the manifest; `None` if it was not opened.
-    pub(crate) fn version(&self) -> Option<(String, String)> {
+    pub fn version(&self) -> Option<(String, String)> {
         let runtime = self.runtime.as_ref()?;
         Some(("onnxruntime".to_owned(), runtime.version().to_owned()))
     }
@@ -199,7 +199,7 @@ impl<'a> EnhancerModels<'a> {
 
 /// An enhancer that an earlier run probed, and whose images were all in the store when this run began. It is opened
 /// once, for all threads, if a stored image turns out to be missing or damaged.
-pub(crate) struct LazyEnhancer {
+pub struct LazyEnhancer {
     name: EnhancerName,
     path: PathBuf,
     settings: EnhancerRunArgs,
@@ -221,7 +221,7 @@ enum Session {
 
 impl LazyEnhancer {
     /// The model in a file, with the findings of its probe in an earlier run.
-    pub(crate) fn new(file: ModelFile, settings: EnhancerRunArgs, findings: ProbeFindings) -> Self {
+    pub fn new(file: ModelFile, settings: EnhancerRunArgs, findings: ProbeFindings) -> Self {
         findings.warn(file.name(), file.path());
         tracing::debug!("{}: not opened, because the store has all its images", file.name());
         Self {
@@ -236,17 +236,17 @@ impl LazyEnhancer {
         }
     }
 
-    pub(crate) fn name(&self) -> &EnhancerName {
+    pub fn name(&self) -> &EnhancerName {
         &self.name
     }
 
     /// Path of the model's file, for messages.
-    pub(crate) fn path(&self) -> &Path {
+    pub fn path(&self) -> &Path {
         &self.path
     }
 
     /// The usage note.
-    pub(crate) fn usage(&self) -> &Usage {
+    pub fn usage(&self) -> &Usage {
         &self.usage
     }
 
@@ -254,7 +254,7 @@ impl LazyEnhancer {
     ///
     /// # Errors
     /// If it cannot be opened (which ends the run), or fails on the image.
-    pub(crate) fn enhance_and_judge(
+    pub fn enhance_and_judge(
         &self,
         image: &Rgb,
         place: [&dyn ToString; 2],
@@ -295,7 +295,7 @@ impl LazyEnhancer {
     }
 
     /// Stops the current image and all later ones; may be called from another thread.
-    pub(crate) fn stop(&self) {
+    pub fn stop(&self) {
         self.is_stopped.store(true, Ordering::SeqCst);
         if let Some(stopper) = self.stopper.get() {
             stopper.stop();

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::time::{Duration, Instant};
 
-use crate::types::Rgb;
-use crate::types::manifests::EnhancerLatency;
+use darkqa_base::types::Rgb;
+use darkqa_base::types::manifests::EnhancerLatency;
 use darkqa_enhance::Enhancer;
 
 /// Time after which no further image is timed (chosen: a run waits no longer for it).
@@ -13,7 +13,7 @@ const ENOUGH: Duration = Duration::from_secs(2);
 
 /// Times of an enhancer for images, one after the other.
 #[derive(Debug, Default)]
-pub(crate) struct Latency {
+pub struct Latency {
     /// Times by width and height, in the order of the images.
     by_size: BTreeMap<(usize, usize), Vec<Duration>>,
     /// Largest number of threads for an image.
@@ -22,12 +22,12 @@ pub(crate) struct Latency {
 
 impl Latency {
     /// No time yet, of an enhancer with at most this number of threads.
-    pub(crate) fn new(threads: usize) -> Self {
+    pub fn new(threads: usize) -> Self {
         Self { by_size: BTreeMap::new(), threads }
     }
 
     /// Runs `enhance` for an image of this width and height, and adds its time. An image that fails has none.
-    pub(crate) fn time<T, E>(&mut self, size: (usize, usize), enhance: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
+    pub fn time<T, E>(&mut self, size: (usize, usize), enhance: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
         let started = Instant::now();
         let enhanced = enhance()?;
         self.add(size, started.elapsed());
@@ -35,7 +35,7 @@ impl Latency {
     }
 
     /// Times an enhancer on images until [`ENOUGH`] has passed. The images are not counted as enhanced images of a run.
-    pub(crate) fn measure(enhancer: &mut Enhancer, images: &[Rgb]) -> Self {
+    pub fn measure(enhancer: &mut Enhancer, images: &[Rgb]) -> Self {
         let mut latency = Self::new(enhancer.threads());
         let started = Instant::now();
         for image in images {
@@ -50,7 +50,7 @@ impl Latency {
 
     /// The times of each size, without the first one, which includes the preparation for that size, unless it is the
     /// only one.
-    pub(crate) fn by_size(&self) -> Vec<EnhancerLatency> {
+    pub fn by_size(&self) -> Vec<EnhancerLatency> {
         self.by_size
             .iter()
             .map(|((width, height), times)| {

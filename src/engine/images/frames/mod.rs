@@ -1,13 +1,13 @@
 //! Frames that are shown together, their photographs, and walks.
 
-pub(crate) mod photographs;
+pub mod photographs;
 mod source;
 mod walk;
 
-pub(crate) use source::{
+pub use source::{
     Frames, InputTally, Source, SourceFrame, first_question_per_frame, input_summary, inspect_all, warn_of_inputs,
 };
-pub(crate) use walk::{WalkArgs, WalkFolder};
+pub use walk::{WalkArgs, WalkFolder};
 
 pub(super) use source::{SourcePhotograph, matching_degradation};
 pub(super) use walk::{CameraScope, DegradeStage};

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::source::{SourcePhotograph, matching_degradation};
-use crate::engine::images::frames::source::{Frames, Source, SourceFrame};
-use crate::engine::images::progress::Progress;
-use crate::error::{Error, Result};
-use crate::types::{PairDark, PairFacts, PhotoName};
+use crate::images::frames::source::{Frames, Source, SourceFrame};
+use crate::images::progress::Progress;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::{PairDark, PairFacts, PhotoName};
 use darkqa_score::photographs::PairDarkness;
 use darkqa_score::photographs::realism::SceneMatch;
 
@@ -16,7 +16,7 @@ use darkqa_score::photographs::realism::SceneMatch;
 const SAMPLED: usize = 24;
 
 /// The names of the photographs of all frames, ordered by their lowest position in the lists of the frames.
-pub(crate) fn names(sources: &[Source]) -> Vec<PhotoName> {
+pub fn names(sources: &[Source]) -> Vec<PhotoName> {
     let frames = sources.iter().flat_map(|source| &source.frames);
     let mut positions = BTreeMap::<&PhotoName, usize>::new();
     for (position, photo) in frames.flat_map(|frame| frame.photographs.iter().enumerate()) {
@@ -31,7 +31,7 @@ pub(crate) fn names(sources: &[Source]) -> Vec<PhotoName> {
 /// Measures the photographs of a sample of the frames and prints how dark they are. Warns if frames have no photograph,
 /// if a photograph shows another scene, and of the findings of [`PairDarkness::warnings`]. Broken files are skipped;
 /// their trials report the error.
-pub(crate) fn print_darkness(frames: &dyn Frames, sources: &[Source], progress: &Progress) {
+pub fn print_darkness(frames: &dyn Frames, sources: &[Source], progress: &Progress) {
     let all: Vec<&SourceFrame> = sources.iter().flat_map(|source| &source.frames).collect();
     for name in names(sources) {
         let pairs: Vec<(&SourceFrame, &SourcePhotograph)> =
@@ -87,7 +87,7 @@ pub(crate) fn print_darkness(frames: &dyn Frames, sources: &[Source], progress: 
 ///
 /// # Errors
 /// If no frame can.
-pub(crate) fn check_matches(sources: &[Source], matches: &[PairDark]) -> Result<()> {
+pub fn check_matches(sources: &[Source], matches: &[PairDark]) -> Result<()> {
     let Some(PairDark::Match(kind, reading)) = matches.first() else {
         return Ok(());
     };
@@ -116,7 +116,7 @@ pub(crate) fn check_matches(sources: &[Source], matches: &[PairDark]) -> Result<
 ///
 /// # Errors
 /// If a file is broken.
-pub(crate) fn measure(frames: &dyn Frames, sources: &mut [Source]) -> Result<()> {
+pub fn measure(frames: &dyn Frames, sources: &mut [Source]) -> Result<()> {
     sources.par_iter_mut().try_for_each(|source| {
         for frame in &mut source.frames {
             if let Some(photo) = frame.photographs.first_mut() {

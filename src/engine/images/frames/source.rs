@@ -9,19 +9,19 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use crate::data::{Dataset, Picture};
-use crate::engine::images::progress::Progress;
-use crate::error::{Error, Result};
-use crate::types::degradations::Kind;
-use crate::types::text::excerpt;
-use crate::types::{
+use crate::images::progress::Progress;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::degradations::Kind;
+use darkqa_base::types::text::excerpt;
+use darkqa_base::types::{
     Condition, Degradation, Digest, FrameId, InputNote, InputSummary, PairDark, PairFacts, PhotoName, ProfileName,
     Question, Rgb, Severity,
 };
+use darkqa_data::{Dataset, Picture};
 use darkqa_light::PairEv;
 
 /// Access to the files of frames.
-pub(crate) trait Frames: Sync {
+pub trait Frames: Sync {
     /// The file of a frame, not decoded.
     fn picture(&self, frame: &FrameId) -> Result<Picture>;
 
@@ -59,26 +59,26 @@ impl Frames for Dataset {
 
 /// One frame of a source.
 #[derive(Debug, Clone)]
-pub(crate) struct SourceFrame {
+pub struct SourceFrame {
     /// Name of the frame, which also seeds its noise.
-    pub(crate) id: FrameId,
+    pub id: FrameId,
     /// Digest of the file and of its reading rule.
-    pub(crate) digest: Digest,
+    pub digest: Digest,
     /// Changes that reading the file makes besides decoding its codes.
-    pub(crate) note: InputNote,
+    pub note: InputNote,
     /// Width and height, in pixels.
-    pub(crate) size: (u32, u32),
+    pub size: (u32, u32),
     /// Exposure value at ISO 100 of the camera's settings; `None` if the file does not state them.
-    pub(crate) exposure_value: Option<f64>,
+    pub exposure_value: Option<f64>,
     /// Horizontal focal length, in pixels; `None` if unknown.
-    pub(crate) focal: Option<f64>,
+    pub focal: Option<f64>,
     /// Photographs of the same scene in the dark.
-    pub(crate) photographs: Vec<SourcePhotograph>,
+    pub photographs: Vec<SourcePhotograph>,
 }
 
 impl SourceFrame {
     /// Reads the file of a frame, which must be an image.
-    pub(crate) fn inspect(frames: &dyn Frames, id: &FrameId) -> Result<Self> {
+    pub fn inspect(frames: &dyn Frames, id: &FrameId) -> Result<Self> {
         let picture = frames.picture(id)?;
         Ok(Self {
             id: id.clone(),
@@ -92,7 +92,7 @@ impl SourceFrame {
     }
 
     /// The photograph of this name.
-    pub(crate) fn photograph(&self, name: &PhotoName) -> Option<&SourcePhotograph> {
+    pub fn photograph(&self, name: &PhotoName) -> Option<&SourcePhotograph> {
         self.photographs.iter().find(|photo| photo.name == *name)
     }
 
@@ -100,7 +100,7 @@ impl SourceFrame {
     ///
     /// # Errors
     /// If the frame has no such photograph.
-    pub(crate) fn picture_digest(&self, condition: &Condition) -> Result<Digest> {
+    pub fn picture_digest(&self, condition: &Condition) -> Result<Digest> {
         let Some(name) = condition.photograph() else {
             return Ok(self.digest);
         };
@@ -113,7 +113,7 @@ impl SourceFrame {
     ///
     /// # Errors
     /// If the exposure drop of the frame's photograph is unknown or cannot be synthesised.
-    pub(crate) fn degradation(&self, condition: &Condition) -> Result<Option<Degradation>> {
+    pub fn degradation(&self, condition: &Condition) -> Result<Option<Degradation>> {
         match condition.pair() {
             Some(PairDark::Match(kind, reading)) => {
                 let (how, _) = matching_degradation(&self.photographs, *kind, reading.as_ref()).ok_or_else(|| {
@@ -128,7 +128,7 @@ impl SourceFrame {
 
     /// True if the frame can be shown in a condition: it has the photograph, or one whose exposure drop can be
     /// synthesised.
-    pub(crate) fn can_show(&self, condition: &Condition) -> bool {
+    pub fn can_show(&self, condition: &Condition) -> bool {
         match condition.pair() {
             None => true,
             Some(PairDark::Photograph(name)) => self.photograph(name).is_some(),
@@ -154,22 +154,22 @@ fn inspect_photographs(frames: &dyn Frames, id: &FrameId) -> Result<Vec<SourcePh
 
 /// Frames that are shown together: a single frame, the frames of one question, or the frames of a walk.
 #[derive(Debug)]
-pub(crate) struct Source {
+pub struct Source {
     /// Name of the frame, of the group of frames, or of the walk.
-    pub(crate) name: FrameId,
+    pub name: FrameId,
     /// The distinct frames; empty if only blind models are asked, or if the source cannot be shown.
-    pub(crate) frames: Vec<SourceFrame>,
+    pub frames: Vec<SourceFrame>,
     /// Indices into `frames`, in the order shown. Repeats a frame if a question shows it twice, or if a walk has fewer
     /// frames than are shown.
-    pub(crate) order: Vec<usize>,
+    pub order: Vec<usize>,
     /// Reason why the source cannot be shown; `None` if it can.
-    pub(crate) problem: Option<String>,
+    pub problem: Option<String>,
 }
 
 impl Source {
     /// The source for questions about this name: a single frame, or the group of frames with this name. Each file is
     /// read once.
-    pub(crate) fn from_questions(dataset: &Dataset, name: &FrameId) -> Result<Self> {
+    pub fn from_questions(dataset: &Dataset, name: &FrameId) -> Result<Self> {
         let mut frames: Vec<SourceFrame> = Vec::new();
         let mut order = Vec::new();
         for id in dataset.shown_frames(name) {
@@ -183,28 +183,28 @@ impl Source {
     }
 
     /// A source without frames, for blind models.
-    pub(crate) fn without_frames(name: FrameId) -> Self {
+    pub fn without_frames(name: FrameId) -> Self {
         Self { name, frames: Vec::new(), order: Vec::new(), problem: None }
     }
 
     /// True if all frames can be shown in a condition.
-    pub(crate) fn can_show(&self, condition: &Condition) -> bool {
+    pub fn can_show(&self, condition: &Condition) -> bool {
         self.frames.iter().all(|frame| frame.can_show(condition))
     }
 
     /// The middle frame; `None` without frames.
-    pub(crate) fn middle(&self) -> Option<&SourceFrame> {
+    pub fn middle(&self) -> Option<&SourceFrame> {
         self.frames.get(self.frames.len() / 2)
     }
 
     /// The digest of all frames in the order shown (for a single frame, the digest of its file); `None` without frames.
-    pub(crate) fn digest(&self) -> Option<Digest> {
+    pub fn digest(&self) -> Option<Digest> {
         Digest::from_file_digests(self.order.iter().map(|index| self.frames[*index].digest))
     }
 }
 
 /// Changes made to the frames of these sources when they were read.
-pub(crate) fn input_summary(sources: &[Source]) -> InputSummary {
+pub fn input_summary(sources: &[Source]) -> InputSummary {
     let mut summary = InputSummary::default();
     for frame in sources.iter().flat_map(|source| &source.frames) {
         summary.add(&frame.id, &frame.note);
@@ -216,14 +216,14 @@ pub(crate) fn input_summary(sources: &[Source]) -> InputSummary {
 }
 
 /// Logs one warning per kind of change made to images when they were read.
-pub(crate) fn warn_of_inputs(summary: &InputSummary) {
+pub fn warn_of_inputs(summary: &InputSummary) {
     for line in summary.lines() {
         tracing::warn!("{line}");
     }
 }
 
 /// The first question about each frame, in the order of the questions.
-pub(crate) fn first_question_per_frame(questions: &[Question]) -> Vec<&Question> {
+pub fn first_question_per_frame(questions: &[Question]) -> Vec<&Question> {
     let mut first = BTreeMap::new();
     for (position, question) in questions.iter().enumerate() {
         first.entry(&question.frame).or_insert((position, question));
@@ -235,7 +235,7 @@ pub(crate) fn first_question_per_frame(questions: &[Question]) -> Vec<&Question>
 
 /// Reads the sources of all questions. Missing or broken files are found here, before anything is paid for, and the
 /// trial keys include the content of the files.
-pub(crate) fn inspect_all(dataset: &Dataset, questions: &[Question], progress: &Progress) -> Result<Vec<Source>> {
+pub fn inspect_all(dataset: &Dataset, questions: &[Question], progress: &Progress) -> Result<Vec<Source>> {
     let first = first_question_per_frame(questions);
     let bar = progress.bar("reading images", first.len());
     first
@@ -253,17 +253,17 @@ pub(crate) fn inspect_all(dataset: &Dataset, questions: &[Question], progress: &
 
 /// Changes to the images of a command so far.
 #[derive(Debug, Default)]
-pub(crate) struct InputTally(Mutex<InputSummary>);
+pub struct InputTally(Mutex<InputSummary>);
 
 impl InputTally {
     /// Counts one image.
-    pub(crate) fn add(&self, frame: &FrameId, note: &InputNote) {
+    pub fn add(&self, frame: &FrameId, note: &InputNote) {
         let mut summary = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         summary.add(frame, note);
     }
 
     /// Logs one warning per kind of change.
-    pub(crate) fn warn(self) {
+    pub fn warn(self) {
         let summary = self.0.into_inner();
         warn_of_inputs(&summary.unwrap_or_else(PoisonError::into_inner));
     }
@@ -271,22 +271,22 @@ impl InputTally {
 
 /// A photograph of a frame's scene in the dark.
 #[derive(Debug, Clone)]
-pub(crate) struct SourcePhotograph {
+pub struct SourcePhotograph {
     /// Name of the condition in which it is shown.
-    pub(crate) name: PhotoName,
+    pub name: PhotoName,
     /// Digest of the file and of its reading rule.
-    pub(crate) digest: Digest,
+    pub digest: Digest,
     /// Changes that reading the file makes besides decoding its codes.
-    pub(crate) note: InputNote,
+    pub note: InputNote,
     /// Exposure drop stated in the data set, in EV; `None` if unknown.
-    pub(crate) stated: Option<f64>,
+    pub stated: Option<f64>,
     /// How dark the photograph is; `None` before it is measured. No store key depends on it.
-    pub(crate) facts: Option<PairFacts>,
+    pub facts: Option<PairFacts>,
 }
 
 impl SourcePhotograph {
     /// Measures how dark the photograph (`low`) is compared with its frame (`normal`).
-    pub(crate) fn measure(&self, normal: &Rgb, low: &Rgb) -> PairFacts {
+    pub fn measure(&self, normal: &Rgb, low: &Rgb) -> PairFacts {
         let measured = PairEv::measure(normal, low);
         PairFacts {
             stated: self.stated,

@@ -9,20 +9,20 @@ use clap::{Args, ValueEnum};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::data::Picture;
-use crate::data::openeqa::{sample_indices, walk_frames};
-use crate::data::{Root, RootArgs};
-use crate::engine::images::frames::source::{Frames, Source, SourceFrame};
-use crate::engine::images::progress::Progress;
-use crate::error::Result;
-use crate::pictures::Scaling;
-use crate::pictures::{DecodeRule, ImageFile};
-use crate::types::{Decides, FrameId};
+use crate::images::frames::source::{Frames, Source, SourceFrame};
+use crate::images::progress::Progress;
+use darkqa_base::error::Result;
+use darkqa_base::types::{Decides, FrameId};
+use darkqa_data::Picture;
+use darkqa_data::openeqa::{sample_indices, walk_frames};
+use darkqa_data::{Root, RootArgs};
+use darkqa_pictures::Scaling;
+use darkqa_pictures::{DecodeRule, ImageFile};
 
 /// Flags that decide which frames of a walk are shown, and how.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "OpenEQA")]
-pub(crate) struct WalkArgs {
+pub struct WalkArgs {
     /// The folder of walks: the frames of a question lie in DIR/EPISODE_HISTORY/*-rgb.png
     #[arg(id = "frames", long, value_name = "DIR", add = Decides::Reply)]
     pub folder: PathBuf,
@@ -44,7 +44,7 @@ pub(crate) struct WalkArgs {
 /// When the light of a frame is reduced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum DegradeStage {
+pub enum DegradeStage {
     /// Before the frames are scaled, as a camera would
     Native,
     /// After the frames are scaled, so that scaling averages no noise away
@@ -54,7 +54,7 @@ pub(crate) enum DegradeStage {
 /// The frames that share one camera state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum CameraScope {
+pub enum CameraScope {
     /// All frames of a walk: one camera recorded it
     Episode,
     /// Each frame has its own
@@ -75,7 +75,7 @@ fn longer_side(text: &str) -> Result<Scaling, String> {
 
 /// Folder of walks, each a folder of frames. The id of a frame is `WALK/FRAME`, without the file extension.
 #[derive(Debug)]
-pub(crate) struct WalkFolder {
+pub struct WalkFolder {
     folder: PathBuf,
     /// Further folders that the walks may lie in.
     further: Vec<PathBuf>,
@@ -95,14 +95,14 @@ impl Frames for WalkFolder {
 }
 
 impl WalkFolder {
-    pub(crate) fn new(walk: &WalkArgs, root: &RootArgs, rule: DecodeRule) -> Self {
+    pub fn new(walk: &WalkArgs, root: &RootArgs, rule: DecodeRule) -> Self {
         Self { folder: walk.folder.clone(), further: root.data_root.clone(), rule }
     }
 
     /// Reads every sampled frame once and returns one source per walk. Missing or broken frames are found here, before
     /// any paid request, and the trial keys include the content of the frames. A walk with such a frame gets a problem;
     /// other walks are unaffected.
-    pub(crate) fn inspect(&self, names: &[String], settings: &WalkArgs, progress: &Progress) -> Vec<Source> {
+    pub fn inspect(&self, names: &[String], settings: &WalkArgs, progress: &Progress) -> Vec<Source> {
         let bar = progress.bar("reading walks", names.len());
         names
             .par_iter()
@@ -122,7 +122,7 @@ impl WalkFolder {
     /// # Errors
     /// If the folder of the walk is missing, has no frame or lies outside the folder of walks, or if a sampled frame is
     /// broken.
-    pub(crate) fn source(&self, name: &str, settings: &WalkArgs) -> Result<Source> {
+    pub fn source(&self, name: &str, settings: &WalkArgs) -> Result<Source> {
         let root = Root::new(&self.folder, &self.further)?;
         let paths = walk_frames(&root, name)?;
         let sample = sample_indices(paths.len(), settings.frames.get());

@@ -8,20 +8,20 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::{ImagePipeline, has_frames_for_all_workers};
-use crate::ask::ImageLimit;
-use crate::engine::images::enhancement::enhancers::{EnhancerRunArgs, Model};
-use crate::engine::images::enhancement::latency::Latency;
-use crate::engine::images::enhancement::{
+use crate::images::enhancement::enhancers::{EnhancerRunArgs, Model};
+use crate::images::enhancement::latency::Latency;
+use crate::images::enhancement::{
     DarkFrames, EnhancedImages, LazyEnhancer, dark_frames, dark_or_darkened, evenly_spaced_indices,
 };
-use crate::engine::images::frame_work::FrameWork;
-use crate::engine::images::frames::Source;
-use crate::engine::images::stored::{FindingsPlace, Needed};
-use crate::engine::images::timings::TimedStep;
-use crate::engine::images::trials::SourcePlan;
-use crate::engine::images::workers::Workers;
-use crate::error::Result;
-use crate::types::{EnhancerName, ImageFacts, Rgb};
+use crate::images::frame_work::FrameWork;
+use crate::images::frames::Source;
+use crate::images::stored::{FindingsPlace, Needed};
+use crate::images::timings::TimedStep;
+use crate::images::trials::SourcePlan;
+use crate::images::workers::Workers;
+use darkqa_ask::ImageLimit;
+use darkqa_base::error::Result;
+use darkqa_base::types::{EnhancerName, ImageFacts, Rgb};
 use darkqa_enhance::{Enhancer, FRAMES, ProbeFindings, Stopper, Usage, sets_in_memory};
 
 /// Size in bytes above which some servers and proxies refuse an image.
@@ -31,7 +31,7 @@ impl ImagePipeline<'_> {
     /// Makes a few images before anything is paid for, to find errors that would stop a run later: the first image of
     /// each enhancer and, for an endpoint, the images of the largest frame without an enhancer. Warns if these are
     /// large and the endpoint's limit is unknown.
-    pub(crate) fn check<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
+    pub fn check<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
         self.try_enhancers(sources, plan)?;
         // Test images do not count as images of the run.
         self.enhancers.iter_mut().for_each(Enhancer::reset_counts);
@@ -64,7 +64,7 @@ impl ImagePipeline<'_> {
     }
 
     /// Probes each enhancer without a plan, on a few frames of these sources; bright frames are darkened first.
-    pub(crate) fn probe_sources(&mut self, sources: &[Source]) -> Result<()> {
+    pub fn probe_sources(&mut self, sources: &[Source]) -> Result<()> {
         if self.enhancers.is_empty() {
             return Ok(());
         }
@@ -91,11 +91,7 @@ impl ImagePipeline<'_> {
     ///
     /// # Errors
     /// If an image cannot be made, or is too large for the endpoint.
-    pub(crate) fn check_largest_image<I>(
-        &mut self,
-        sources: &[Source],
-        plan: &[SourcePlan<I>],
-    ) -> Result<Option<ImageFacts>> {
+    pub fn check_largest_image<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<Option<ImageFacts>> {
         let frames = plan.iter().flat_map(|part| {
             let source = &sources[part.source];
             source.frames.iter().map(move |frame| (part, source, frame))
@@ -139,7 +135,7 @@ impl ImagePipeline<'_> {
     ///
     /// # Errors
     /// If a session cannot be opened.
-    pub(crate) fn open_enhancer_sets<I>(
+    pub fn open_enhancer_sets<I>(
         &mut self,
         sources: &[Source],
         plan: &[SourcePlan<I>],
@@ -177,7 +173,7 @@ fn warn_about_large_images(largest: Option<&ImageFacts>, limit: ImageLimit) {
 }
 
 /// Handle that stops an enhancer from another thread.
-pub(crate) enum EnhancerStopper {
+pub enum EnhancerStopper {
     /// An open session.
     Open(Stopper),
     /// A session that may be opened later.
@@ -186,7 +182,7 @@ pub(crate) enum EnhancerStopper {
 
 impl EnhancerStopper {
     /// Stops the current image and all later ones.
-    pub(crate) fn stop(&self) {
+    pub fn stop(&self) {
         match self {
             Self::Open(stopper) => stopper.stop(),
             Self::Lazy(enhancer) => enhancer.stop(),
@@ -211,7 +207,7 @@ impl<'a> ImagePipeline<'a> {
     ///
     /// # Errors
     /// If a model cannot be opened, its images are implausible, or a frame cannot be read.
-    pub(crate) fn open_enhancers<I>(
+    pub fn open_enhancers<I>(
         &mut self,
         models: Vec<Model>,
         settings: &EnhancerRunArgs,
@@ -316,7 +312,7 @@ impl<'a> ImagePipeline<'a> {
     ///
     /// # Errors
     /// If its images are implausible, or a frame cannot be read.
-    pub(crate) fn probe<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
+    pub fn probe<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
         let mut enhancers = std::mem::take(&mut self.enhancers);
         for enhancer in &mut enhancers {
             self.probe_one(enhancer, sources, plan)?;
@@ -339,7 +335,7 @@ impl<'a> ImagePipeline<'a> {
     }
 
     /// Handles that stop the enhancers.
-    pub(crate) fn stoppers(&self) -> Vec<EnhancerStopper> {
+    pub fn stoppers(&self) -> Vec<EnhancerStopper> {
         let open = self
             .enhancers
             .iter()
@@ -350,7 +346,7 @@ impl<'a> ImagePipeline<'a> {
     }
 
     /// The usage notes of all enhancers, with their names.
-    pub(crate) fn usages(&self) -> Vec<(EnhancerName, Usage)> {
+    pub fn usages(&self) -> Vec<(EnhancerName, Usage)> {
         let open = self.enhancers.iter().map(|enhancer| (enhancer.name().clone(), enhancer.usage()));
         let lazy = self.lazy.iter().map(|enhancer| (enhancer.name().clone(), enhancer.usage().clone()));
         let imported =

@@ -3,14 +3,14 @@
 use std::num::NonZeroU32;
 
 use super::*;
-use crate::data::{Dataset, open_images};
-use crate::engine::images::frames::{CameraScope, DegradeStage};
-use crate::engine::images::notes::WantedNotes;
-use crate::engine::images::recipes::Recipe;
-use crate::engine::images::timings::Timings;
-use crate::pictures::{PayloadFormat, Scaling};
-use crate::types::manifests::PngForm;
+use crate::images::frames::{CameraScope, DegradeStage};
+use crate::images::notes::WantedNotes;
+use crate::images::recipes::Recipe;
+use crate::images::timings::Timings;
+use darkqa_base::types::manifests::PngForm;
+use darkqa_data::{Dataset, open_images};
 use darkqa_light::KindSettings;
+use darkqa_pictures::{PayloadFormat, Scaling};
 
 /// A folder with one frame as a plain PNG file, and the frame as a source.
 fn frame() -> (tempfile::TempDir, Dataset, Source) {
@@ -79,8 +79,7 @@ fn thumbnails_show_the_sent_image() {
             let (image, notes, _) = pipeline_output(condition, format, max_side, true);
             let thumbnail = notes.thumbnail.unwrap();
             let from_payload =
-                crate::engine::images::notes::thumbnail(&thumbnail.frame, &thumbnail.condition, &image, None, None)
-                    .unwrap();
+                crate::images::notes::thumbnail(&thumbnail.frame, &thumbnail.condition, &image, None, None).unwrap();
             assert_eq!(thumbnail, from_payload, "{condition} {format} {max_side:?}");
         }
     }

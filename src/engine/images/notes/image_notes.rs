@@ -3,27 +3,27 @@
 
 use std::collections::BTreeSet;
 
-use crate::engine::images::stored::Similarity;
-use crate::error::Result;
-use crate::pictures::Payload;
-use crate::runs::missing_thumbnails::MissingThumbnails;
-use crate::store::Store;
-use crate::types::questions::PixelBox;
-use crate::types::{Condition, FrameId, ImageFidelity, Rgb, Shared, Thumbnail};
+use crate::images::stored::Similarity;
+use darkqa_base::error::Result;
+use darkqa_base::types::questions::PixelBox;
+use darkqa_base::types::{Condition, FrameId, ImageFidelity, Rgb, Shared, Thumbnail};
+use darkqa_pictures::Payload;
+use darkqa_runs::missing_thumbnails::MissingThumbnails;
 use darkqa_score::answers::record::Detail;
 use darkqa_score::photographs::realism::psnr;
 use darkqa_score::photographs::realism::ssim::sampled_ssim;
+use darkqa_store::Store;
 
 /// The notes about one image; `None` for a note that is not wanted or exists already.
 #[derive(Debug, Default)]
-pub(crate) struct ImageNotes {
-    pub(crate) thumbnail: Option<Thumbnail>,
-    pub(crate) fidelity: Option<ImageFidelity>,
+pub struct ImageNotes {
+    pub thumbnail: Option<Thumbnail>,
+    pub fidelity: Option<ImageFidelity>,
 }
 
 impl ImageNotes {
     /// Appends the notes to the files of a run.
-    pub(crate) fn store<D: Detail>(&self, store: &mut Store<D>) -> Result<()> {
+    pub fn store<D: Detail>(&self, store: &mut Store<D>) -> Result<()> {
         if let Some(thumbnail) = &self.thumbnail {
             store.append_thumbnail(thumbnail)?;
         }
@@ -36,7 +36,7 @@ impl ImageNotes {
 
 /// The notes that a run folder does not have yet; by default none.
 #[derive(Debug, Default)]
-pub(crate) struct MissingNotes {
+pub struct MissingNotes {
     thumbnails: MissingThumbnails,
     /// Images whose fidelity is stored already.
     measured: BTreeSet<(Shared<FrameId>, Shared<Condition>)>,
@@ -44,24 +44,24 @@ pub(crate) struct MissingNotes {
 
 /// Which notes about an image are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct WantedNotes {
-    pub(crate) thumbnail: bool,
-    pub(crate) fidelity: bool,
+pub struct WantedNotes {
+    pub thumbnail: bool,
+    pub fidelity: bool,
 }
 
 impl MissingNotes {
     /// The missing thumbnails, and the fidelity of all images except those `measured` already.
-    pub(crate) fn new(thumbnails: MissingThumbnails, measured: Vec<ImageFidelity>) -> Self {
+    pub fn new(thumbnails: MissingThumbnails, measured: Vec<ImageFidelity>) -> Self {
         Self { thumbnails, measured: measured.into_iter().map(|image| (image.frame, image.condition)).collect() }
     }
 
     /// The objects of a frame that the thumbnail crops.
-    pub(crate) fn objects(&self, frame: &FrameId) -> &[PixelBox] {
+    pub fn objects(&self, frame: &FrameId) -> &[PixelBox] {
         self.thumbnails.objects(frame)
     }
 
     /// The notes to make about a frame in a condition. The clean frame is not compared with itself.
-    pub(crate) fn wanted(&self, frame: &FrameId, condition: &Condition) -> WantedNotes {
+    pub fn wanted(&self, frame: &FrameId, condition: &Condition) -> WantedNotes {
         // An untouched frame may be dark, so it is no reference for its enhanced image. A photograph in the dark may
         // not be aligned with its frame.
         let has_reference = condition.degradation().is_some();

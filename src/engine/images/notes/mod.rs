@@ -10,12 +10,12 @@ use std::borrow::Cow;
 use std::num::NonZeroU32;
 use std::sync::Arc;
 
-use crate::error::{Error, Result};
-use crate::pictures::{Payload, PayloadFormat, Scaling};
-use crate::types::questions::PixelBox;
-use crate::types::{Condition, FrameId, ObjectCrop, Rgb, Thumbnail};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::questions::PixelBox;
+use darkqa_base::types::{Condition, FrameId, ObjectCrop, Rgb, Thumbnail};
+use darkqa_pictures::{Payload, PayloadFormat, Scaling};
 
-pub(crate) use image_notes::{ImageNotes, MissingNotes};
+pub use image_notes::{ImageNotes, MissingNotes};
 
 pub(super) use image_notes::{WantedNotes, fidelity, similarity};
 
@@ -34,7 +34,7 @@ fn columns(images: usize) -> usize {
 ///
 /// # Errors
 /// None in practice: the number of samples follows from the sides.
-pub(crate) fn montage(images: &[Rgb]) -> Result<Rgb> {
+pub fn montage(images: &[Rgb]) -> Result<Rgb> {
     let height = images.iter().map(Rgb::height).max().unwrap_or(1);
     let width = images.iter().map(Rgb::width).max().unwrap_or(1);
     let columns = columns(images.len());
@@ -56,7 +56,7 @@ pub(crate) fn montage(images: &[Rgb]) -> Result<Rgb> {
 
 /// Version of the thumbnails. Raise it whenever a byte of one changes, so that older thumbnails in an image store are
 /// not reused.
-pub(crate) const VERSION: u32 = 1;
+pub const VERSION: u32 = 1;
 
 /// Maximum side of a small copy, in pixels. An arbitrary choice.
 const COPY_SIDE: u32 = 240;
@@ -78,11 +78,7 @@ const OBJECT_MARGIN: f64 = 0.2;
 
 /// Makes one thumbnail of images as they were sent together. The crop is of the middle image. Up to [`MAX_TILES`]
 /// images are shown side by side in the small copy; of more, only the middle image is shown. `None` without images.
-pub(crate) fn thumbnail_of_all(
-    frame: &FrameId,
-    condition: &Condition,
-    sent: &[Arc<Payload>],
-) -> Result<Option<Thumbnail>> {
+pub fn thumbnail_of_all(frame: &FrameId, condition: &Condition, sent: &[Arc<Payload>]) -> Result<Option<Thumbnail>> {
     let Some(middle) = sent.get(sent.len() / 2) else {
         return Ok(None);
     };
@@ -104,7 +100,7 @@ pub(crate) fn thumbnail_of_all(
 
 /// Makes the thumbnail of an image as it was sent: a small copy, a centre crop, and crops of the `shown` objects. Crops
 /// are brightened by [`crop_gain`]. With the `encoded` pixels, a PNG is not decoded.
-pub(crate) fn thumbnail(
+pub fn thumbnail(
     frame: &FrameId,
     condition: &Condition,
     sent: &Payload,
@@ -148,11 +144,11 @@ fn crop_gain(condition: &Condition, sent: &Payload) -> f32 {
 
 /// Objects of a frame to crop.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct ShownObjects<'a> {
+pub struct ShownObjects<'a> {
     /// Width and height of the frame, in pixels.
-    pub(crate) size: [u32; 2],
+    pub size: [u32; 2],
     /// Boxes of the objects, in pixels of the frame.
-    pub(crate) objects: &'a [PixelBox],
+    pub objects: &'a [PixelBox],
 }
 
 /// A rectangle in an image: top, left, height and width, in pixels.
@@ -247,7 +243,7 @@ fn brightened_crop(image: &Rgb, [top, left, height, width]: CropRect, ev: f32) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pictures::fit;
+    use darkqa_pictures::fit;
 
     fn filled(height: usize, width: usize, code: u8) -> Rgb {
         Rgb::new(height, width, vec![code; height * width * 3]).unwrap()

@@ -11,24 +11,26 @@ use clap::{ArgAction, ArgMatches, CommandFactory as _, Parser};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::data::{DataArgs, DecodeArgs, Picture, SceneArgs};
-use crate::engine::images::frames::WalkArgs;
-use crate::engine::images::stored::{ImageOrigin, Sidecar, differing_fields};
-use crate::error::{Error, Result};
-use crate::pictures::ImageArgs;
-use crate::types::degradations::{Axis, Kind};
-use crate::types::flags::flag_spelling;
-use crate::types::{Condition, Decides, Degradation, Digest, ExposureFacts, FrameId, InputNote, ProfileName, Rgb};
+use crate::images::frames::WalkArgs;
+use crate::images::stored::{ImageOrigin, Sidecar, differing_fields};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::degradations::{Axis, Kind};
+use darkqa_base::types::flags::flag_spelling;
+use darkqa_base::types::{
+    Condition, Decides, Degradation, Digest, ExposureFacts, FrameId, InputNote, ProfileName, Rgb,
+};
+use darkqa_data::{DataArgs, DecodeArgs, Picture, SceneArgs};
 use darkqa_enhance::{EnhancedFolder, SizeArgs};
 use darkqa_light::movement::blur::{blur, blurred_codes};
 use darkqa_light::{
     self, Amplify, AppliedDegradation, CameraArgs, CameraState, Clean, Coupling, Draws, NoiseKey, SensorArgs, Streak,
     Tone, develop_with_state, expose, exposure,
 };
+use darkqa_pictures::ImageArgs;
 
 /// Everything that decides the pixels of an image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct ImageRecipe {
+pub struct ImageRecipe {
     frame: String,
     /// Digest of the input image.
     source: String,
@@ -124,7 +126,7 @@ impl SensorRecord {
 impl ImageRecipe {
     /// The recipe of an image of a frame. `source` is the digest of the input file, and `read` how it was read. For the
     /// clean frame, `how` and `applied` are `None`.
-    pub(crate) fn new(
+    pub fn new(
         frame: &FrameId,
         source: Digest,
         read: InputNote,
@@ -160,12 +162,12 @@ impl ImageRecipe {
         }
     }
 
-    pub(crate) fn frame(&self) -> FrameId {
+    pub fn frame(&self) -> FrameId {
         FrameId(self.frame.clone())
     }
 
     /// The name of the image file without its extension.
-    pub(crate) fn name(&self, stem: &str) -> String {
+    pub fn name(&self, stem: &str) -> String {
         format!("{stem}_{}", self.condition)
     }
 
@@ -173,7 +175,7 @@ impl ImageRecipe {
     ///
     /// # Errors
     /// If `picture` is not the original input, or this program has another version of the synthesis.
-    pub(crate) fn replay(file: &Sidecar<Self>, picture: &Picture, path: &Path) -> Result<Rgb> {
+    pub fn replay(file: &Sidecar<Self>, picture: &Picture, path: &Path) -> Result<Rgb> {
         file.recipe.image(picture, file.program(), path)
     }
 
@@ -244,39 +246,39 @@ fn version(how: Option<&Degradation>) -> u32 {
 const REPLACED: &str = "data";
 
 /// Flag values by long name: a text, a list of texts, or `true` for a switch.
-pub(crate) type ImageWords = BTreeMap<String, Value>;
+pub type ImageWords = BTreeMap<String, Value>;
 
 /// All flags that decide images.
 #[derive(Debug, Parser)]
 #[command(no_binary_name = true, disable_help_flag = true, mut_arg("frames", |arg| arg.required(false)))]
-pub(crate) struct ImageFlags {
+pub struct ImageFlags {
     #[command(flatten)]
-    pub(crate) data: DataArgs,
+    pub data: DataArgs,
     #[command(flatten)]
-    pub(crate) scene: SceneArgs,
+    pub scene: SceneArgs,
     #[command(flatten)]
-    pub(crate) decode: DecodeArgs,
+    pub decode: DecodeArgs,
     #[command(flatten)]
-    pub(crate) sensor: SensorArgs,
+    pub sensor: SensorArgs,
     #[command(flatten)]
-    pub(crate) camera: CameraArgs,
+    pub camera: CameraArgs,
     #[arg(long, add = Decides::Trials)]
-    pub(crate) llie: Vec<PathBuf>,
+    pub llie: Vec<PathBuf>,
     #[arg(long, add = Decides::Trials)]
-    pub(crate) enhanced: Vec<EnhancedFolder>,
+    pub enhanced: Vec<EnhancedFolder>,
     #[command(flatten)]
-    pub(crate) size: SizeArgs,
+    pub size: SizeArgs,
     #[command(flatten)]
-    pub(crate) images: ImageArgs,
+    pub images: ImageArgs,
     #[arg(long, add = Decides::Pixels)]
-    pub(crate) max_side: Option<NonZeroU32>,
+    pub max_side: Option<NonZeroU32>,
     #[command(flatten)]
-    pub(crate) walk: Option<WalkArgs>,
+    pub walk: Option<WalkArgs>,
 }
 
 impl ImageFlags {
     /// Parses the flags that a manifest stores.
-    pub(crate) fn read(words: &ImageWords) -> Result<Self, String> {
+    pub fn read(words: &ImageWords) -> Result<Self, String> {
         let flags = words.iter().flat_map(|(flag, value)| match value {
             Value::Bool(true) => vec![format!("--{flag}")],
             Value::Array(list) => list.iter().map(|value| format!("--{flag}={}", flag_text(value))).collect(),
@@ -297,7 +299,7 @@ fn flag_text(value: &Value) -> String {
 ///
 /// # Errors
 /// If a value is not valid Unicode, so that a manifest cannot store it.
-pub(crate) fn typed_flags(matches: &ArgMatches) -> Result<ImageWords> {
+pub fn typed_flags(matches: &ArgMatches) -> Result<ImageWords> {
     let flags = ImageFlags::command();
     let mut words = ImageWords::new();
     for argument in flags.get_arguments() {

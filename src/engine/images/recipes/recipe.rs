@@ -7,45 +7,40 @@ use std::num::NonZeroU32;
 
 use serde::Serialize;
 
-use crate::engine::images::enhancement::{DarkImage, EnhancedImages};
-use crate::engine::images::frames::{CameraScope, DegradeStage, Source, SourceFrame, WalkArgs};
-use crate::engine::images::recipes::image_recipe::ImageRecipe;
-use crate::error::{Error, Result};
-use crate::pictures::{PayloadFormat, Scaling};
-use crate::types::degradations::Kind;
-use crate::types::{Condition, Degradation, Digest, EnhancerName, ExposureFacts, FrameId, Severity};
+use crate::images::enhancement::{DarkImage, EnhancedImages};
+use crate::images::frames::{CameraScope, DegradeStage, Source, SourceFrame, WalkArgs};
+use crate::images::recipes::image_recipe::ImageRecipe;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::degradations::Kind;
+use darkqa_base::types::{Condition, Degradation, Digest, EnhancerName, ExposureFacts, FrameId, Severity};
 use darkqa_enhance::{EnhancedFolder, ModelFile, SizeArgs};
-use darkqa_light::{self, AppliedDegradation, FrameView, KindSettings, NoiseKey, Synthesis};
+use darkqa_light::{AppliedDegradation, FrameView, KindSettings, NoiseKey, Synthesis};
+use darkqa_pictures::{PayloadFormat, Scaling};
 
 /// All settings that decide an image, except its frame and its condition.
 #[derive(Debug)]
-pub(crate) struct Recipe {
-    pub(crate) seed: u64,
-    pub(crate) kinds: KindSettings,
-    pub(crate) format: PayloadFormat,
-    pub(crate) scaling: Scaling,
+pub struct Recipe {
+    pub seed: u64,
+    pub kinds: KindSettings,
+    pub format: PayloadFormat,
+    pub scaling: Scaling,
     /// When frames are degraded: before or after scaling.
-    pub(crate) degraded_at: DegradeStage,
+    pub degraded_at: DegradeStage,
     /// The frames that share one camera state.
-    pub(crate) camera_scope: CameraScope,
+    pub camera_scope: CameraScope,
     /// Enhancement models to run, with the digests of their files.
-    pub(crate) enhancers: Vec<(EnhancerName, Digest)>,
+    pub enhancers: Vec<(EnhancerName, Digest)>,
     /// Images that were enhanced by other programs (`--enhanced`), one entry per folder.
-    pub(crate) enhanced_images: Vec<EnhancedImages>,
+    pub enhanced_images: Vec<EnhancedImages>,
 }
 
 impl Recipe {
-    pub(crate) fn new(
-        kinds: &KindSettings,
-        format: PayloadFormat,
-        max_side: Option<NonZeroU32>,
-        files: &[ModelFile],
-    ) -> Self {
+    pub fn new(kinds: &KindSettings, format: PayloadFormat, max_side: Option<NonZeroU32>, files: &[ModelFile]) -> Self {
         Self { format, scaling: max_side.map_or(Scaling::Never, Scaling::MaxSide), ..Self::lossless(kinds, files) }
     }
 
     /// The recipe for PNG images in the size of their frames.
-    pub(crate) fn lossless(kinds: &KindSettings, files: &[ModelFile]) -> Self {
+    pub fn lossless(kinds: &KindSettings, files: &[ModelFile]) -> Self {
         Self {
             seed: kinds.sensor.seed,
             kinds: kinds.clone(),
@@ -62,35 +57,36 @@ impl Recipe {
     ///
     /// # Errors
     /// If a folder cannot be read, or two enhancers have the same name.
-    pub(crate) fn with_enhanced_images(self, folders: &[EnhancedFolder]) -> Result<Self> {
+    pub fn with_enhanced_images(self, folders: &[EnhancedFolder]) -> Result<Self> {
         let models = self.enhancers.iter().map(|(name, _)| name);
         Ok(Self { enhanced_images: EnhancedImages::open_all(folders, models)?, ..self })
     }
 
     /// The names of all enhancers: first the models to run, then the folders of enhanced images.
-    pub(crate) fn enhancer_names(&self) -> Vec<EnhancerName> {
+    pub fn enhancer_names(&self) -> Vec<EnhancerName> {
         let models = self.enhancers.iter().map(|(name, _)| name);
         let folders = self.enhanced_images.iter().map(EnhancedImages::name);
         models.chain(folders).cloned().collect()
     }
 
     /// The folder of enhanced images with this name; `None` if the enhancer is a model to run.
-    pub(crate) fn enhanced_images(&self, name: &EnhancerName) -> Option<&EnhancedImages> {
+    pub fn enhanced_images(&self, name: &EnhancerName) -> Option<&EnhancedImages> {
         self.enhanced_images.iter().find(|images| images.name() == name)
     }
 
     /// The recipe for frames of walks.
-    pub(crate) fn for_walks(self, walk: &WalkArgs) -> Self {
+    #[must_use]
+    pub fn for_walks(self, walk: &WalkArgs) -> Self {
         Self { scaling: walk.side, degraded_at: walk.degraded_at, camera_scope: walk.camera, ..self }
     }
 
     /// The seed of a draw of the noise, so that draw `n` has the images of a run whose seed is larger by `n`.
-    pub(crate) fn seed(&self, draw: u16) -> u64 {
+    pub fn seed(&self, draw: u16) -> u64 {
         self.seed.wrapping_add(u64::from(draw))
     }
 
     /// The key of a draw of the noise of a frame.
-    pub(crate) fn noise_key(&self, source: &FrameId, frame: &FrameId, draw: u16) -> NoiseKey {
+    pub fn noise_key(&self, source: &FrameId, frame: &FrameId, draw: u16) -> NoiseKey {
         let seed = self.seed(draw);
         let own = NoiseKey::new(seed, frame);
         match self.camera_scope {
@@ -105,7 +101,7 @@ impl Recipe {
     ///
     /// # Errors
     /// If the recipe lacks the noise profile of the condition.
-    pub(crate) fn stimulus_digest(&self, source: &Source, condition: &Condition) -> Result<Digest> {
+    pub fn stimulus_digest(&self, source: &Source, condition: &Condition) -> Result<Digest> {
         let images: Vec<ImageKeyFacts<'_>> =
             source.frames.iter().map(|frame| self.key_facts(&source.name, frame, condition)).collect::<Result<_>>()?;
         let in_order: Vec<&ImageKeyFacts<'_>> = source.order.iter().map(|index| &images[*index]).collect();
@@ -116,7 +112,7 @@ impl Recipe {
     ///
     /// # Errors
     /// If the recipe lacks the noise profile of the condition.
-    pub(crate) fn key_facts<'a>(
+    pub fn key_facts<'a>(
         &'a self,
         source: &'a FrameId,
         frame: &'a SourceFrame,
@@ -154,7 +150,7 @@ impl Recipe {
     ///
     /// # Errors
     /// If a frame would move too far during its exposure, or images of a folder cannot be used.
-    pub(crate) fn check(&self, sources: &[Source], conditions: &[Condition]) -> Result<()> {
+    pub fn check(&self, sources: &[Source], conditions: &[Condition]) -> Result<()> {
         for source in sources {
             for frame in &source.frames {
                 let how = conditions
@@ -240,7 +236,7 @@ impl Recipe {
 
     /// Width and focal length of a frame of this width and height, in pixels of the size in which it is degraded.
     /// `focal` is in pixels of the frame.
-    pub(crate) fn view(&self, size: (u32, u32), focal: Option<f64>) -> FrameView {
+    pub fn view(&self, size: (u32, u32), focal: Option<f64>) -> FrameView {
         let native_width = size.0 as usize;
         let width = match self.degraded_at {
             DegradeStage::Native => native_width,
@@ -253,7 +249,7 @@ impl Recipe {
 
 /// The facts that decide an image, as they enter its digest.
 #[derive(Serialize)]
-pub(crate) struct ImageKeyFacts<'a> {
+pub struct ImageKeyFacts<'a> {
     picture: Digest,
     degradation: Option<DegradationFacts<'a>>,
     enhancer: Option<EnhancerFacts>,
@@ -291,7 +287,7 @@ struct EnhancerFacts {
 /// is not included: six models (Zero-DCE, RUAS, SCI, Retinexformer, DarkIR, `lift`) gave the same bytes with 1, 2 and 3
 /// threads, and a graph that may give others runs on one.
 #[derive(Debug, Serialize)]
-pub(crate) struct Maker {
+pub struct Maker {
     /// Version of this program, because encoders may change with it.
     program: &'static str,
     /// Processor and operating system, because results of ONNX Runtime may depend on them.
@@ -305,7 +301,7 @@ pub(crate) struct Maker {
 
 impl Maker {
     /// This program, with this version of ONNX Runtime and these sizes of enhanced images.
-    pub(crate) fn new(runtime: Option<(String, String)>, sizes: &SizeArgs) -> Self {
+    pub fn new(runtime: Option<(String, String)>, sizes: &SizeArgs) -> Self {
         Self {
             program: env!("CARGO_PKG_VERSION"),
             machine: [std::env::consts::ARCH, std::env::consts::OS],
@@ -317,7 +313,7 @@ impl Maker {
     }
 
     /// Version of this program.
-    pub(crate) fn program(&self) -> &'static str {
+    pub fn program(&self) -> &'static str {
         self.program
     }
 }

@@ -6,7 +6,5 @@ mod stored_images;
 pub(super) use output_image::differing_fields;
 pub(super) use stored_images::{FindingsPlace, Similarity, StoredImage, StoredNotes, StoredPlace};
 
-pub(crate) use output_image::{
-    ImageCounts, ImageOrigin, ImageOutcome, ImageRefusals, OutputFile, OutputImage, Sidecar,
-};
-pub(crate) use stored_images::{Needed, StoredFindings, StoredImages};
+pub use output_image::{ImageCounts, ImageOrigin, ImageOutcome, ImageRefusals, OutputFile, OutputImage, Sidecar};
+pub use stored_images::{Needed, StoredFindings, StoredImages};

@@ -14,13 +14,13 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::error::{Error, Result};
-use crate::files::{self, write};
-use crate::pictures::{DecodeRule, ImageFile, png};
-use crate::types::{Digest, Rgb};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::files::{self, write};
+use darkqa_base::types::{Digest, Rgb};
+use darkqa_pictures::{DecodeRule, ImageFile, png};
 
 /// The origin of an image, as written in its JSON sidecar.
-pub(crate) trait ImageOrigin: Clone + PartialEq + Serialize + DeserializeOwned {
+pub trait ImageOrigin: Clone + PartialEq + Serialize + DeserializeOwned {
     /// Accepted values of `schema`; the first one is written.
     const SCHEMAS: &'static [&'static str];
     /// True if an intact image with other settings is replaced; otherwise it is refused.
@@ -35,12 +35,12 @@ pub(crate) trait ImageOrigin: Clone + PartialEq + Serialize + DeserializeOwned {
 
 /// The JSON sidecar of an image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Sidecar<R> {
+pub struct Sidecar<R> {
     schema: String,
     /// The version of this program, for information only.
     darkqa_eval: String,
     #[serde(flatten)]
-    pub(crate) recipe: R,
+    pub recipe: R,
     /// Why the image may be wrong (`--allow bad-enhancer`). Depends on all images of a call and does not affect the
     /// pixels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -52,9 +52,9 @@ pub(crate) struct Sidecar<R> {
 
 /// An image file as it was written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct OutputFile {
+pub struct OutputFile {
     /// Name of the file, in the folder of the sidecar.
-    pub(crate) file: String,
+    pub file: String,
     /// Length in bytes.
     bytes: u64,
     /// BLAKE3 digest of the file.
@@ -72,7 +72,7 @@ impl OutputFile {
     }
 
     /// How these bytes differ from the written file; `None` if they are the same.
-    pub(crate) fn fault(&self, bytes: &[u8]) -> Option<String> {
+    pub fn fault(&self, bytes: &[u8]) -> Option<String> {
         if bytes.len() as u64 != self.bytes {
             let found = bytes.len();
             return Some(format!("has {found} bytes, was written with {}", self.bytes));
@@ -87,7 +87,7 @@ impl<R: ImageOrigin> Sidecar<R> {
     ///
     /// # Errors
     /// If it cannot be read or parsed, or has an unknown schema.
-    pub(crate) fn read(path: &Path) -> Result<Self> {
+    pub fn read(path: &Path) -> Result<Self> {
         let text = files::text(path)?;
         let sidecar: Self = serde_json::from_str(&text)
             .map_err(|e| Error::data(path.display(), format_args!("not a JSON file of an image: {e}")))?;
@@ -100,12 +100,12 @@ impl<R: ImageOrigin> Sidecar<R> {
     }
 
     /// The version of the program that wrote the file.
-    pub(crate) fn program(&self) -> &str {
+    pub fn program(&self) -> &str {
         &self.darkqa_eval
     }
 
     /// True if the image was written with this digest; false for sidecars of the first schema.
-    pub(crate) fn has_digest(&self, image: Digest) -> bool {
+    pub fn has_digest(&self, image: Digest) -> bool {
         self.output.as_ref().is_some_and(|output| output.digest == image.to_string())
     }
 
@@ -127,7 +127,7 @@ impl<R: ImageOrigin> Sidecar<R> {
 
 /// The outcome of one output file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum ImageOutcome {
+pub enum ImageOutcome {
     /// The image was made.
     Written,
     /// The image existed already.
@@ -138,32 +138,32 @@ pub(crate) enum ImageOutcome {
 
 /// An image that was not made, because another one exists in its place.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct ImageRefusal {
+pub struct ImageRefusal {
     /// Path of the existing image.
-    pub(crate) image: PathBuf,
+    pub image: PathBuf,
     /// How it differs, and the remedy.
-    pub(crate) problem: String,
+    pub problem: String,
 }
 
 impl ImageRefusal {
     /// The error for a command that makes only one image.
-    pub(crate) fn into_error(self) -> Error {
+    pub fn into_error(self) -> Error {
         Error::data(self.image.display(), self.problem)
     }
 }
 
 /// Number of images by outcome.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct ImageCounts {
-    pub(crate) written: usize,
-    pub(crate) unchanged: usize,
-    pub(crate) failed: usize,
+pub struct ImageCounts {
+    pub written: usize,
+    pub unchanged: usize,
+    pub failed: usize,
 }
 
 impl ImageCounts {
     /// Counts an image. A refusal counts as failed and is returned.
     #[must_use]
-    pub(crate) fn add(&mut self, outcome: ImageOutcome) -> Option<ImageRefusal> {
+    pub fn add(&mut self, outcome: ImageOutcome) -> Option<ImageRefusal> {
         match outcome {
             ImageOutcome::Written => self.written += 1,
             ImageOutcome::Unchanged => self.unchanged += 1,
@@ -176,7 +176,7 @@ impl ImageCounts {
     }
 
     /// Text about the images that were not written, to append to a line; empty if all were written.
-    pub(crate) fn not_written_text(self) -> String {
+    pub fn not_written_text(self) -> String {
         [(self.unchanged, "left as they were (--force makes them again)"), (self.failed, "failed")]
             .into_iter()
             .filter(|(number, _)| *number > 0)
@@ -198,7 +198,7 @@ enum OutputAction {
 }
 
 /// The paths of an output image and its JSON sidecar.
-pub(crate) struct OutputImage {
+pub struct OutputImage {
     image: PathBuf,
     json: PathBuf,
     /// True if existing files are overwritten.
@@ -209,13 +209,14 @@ pub(crate) struct OutputImage {
 
 impl OutputImage {
     /// The output image `name` in a folder.
-    pub(crate) fn new(folder: &Path, name: &str, is_forced: bool) -> Self {
+    pub fn new(folder: &Path, name: &str, is_forced: bool) -> Self {
         let [image, json] = [".png", ".json"].map(|end| folder.join(name.to_owned() + end));
         Self { image, json, is_forced, overruled_problem: None }
     }
 
     /// Sets the reason why the image may be wrong.
-    pub(crate) fn with_overruled_problem(self, overruled_problem: Option<String>) -> Self {
+    #[must_use]
+    pub fn with_overruled_problem(self, overruled_problem: Option<String>) -> Self {
         Self { overruled_problem, ..self }
     }
 
@@ -223,7 +224,7 @@ impl OutputImage {
     ///
     /// # Errors
     /// If a file cannot be read or written.
-    pub(crate) fn write_unless_present<R: ImageOrigin>(
+    pub fn write_unless_present<R: ImageOrigin>(
         &self,
         recipe: &R,
         make: impl FnOnce() -> Result<Rgb>,
@@ -323,16 +324,16 @@ fn decode(path: &Path, bytes: &[u8]) -> Option<Rgb> {
 
 /// The refused images of a command by reason; thread-safe.
 #[derive(Debug, Default)]
-pub(crate) struct ImageRefusals(Mutex<BTreeMap<String, BTreeSet<PathBuf>>>);
+pub struct ImageRefusals(Mutex<BTreeMap<String, BTreeSet<PathBuf>>>);
 
 impl ImageRefusals {
-    pub(crate) fn add(&self, ImageRefusal { image, problem }: ImageRefusal) {
+    pub fn add(&self, ImageRefusal { image, problem }: ImageRefusal) {
         let mut refused = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         refused.entry(problem).or_default().insert(image);
     }
 
     /// Logs each reason once, with its first image and the number of the others.
-    pub(crate) fn log(self) {
+    pub fn log(self) {
         let refused = self.0.into_inner().unwrap_or_else(PoisonError::into_inner);
         for (problem, images) in refused {
             let Some(first) = images.first() else {

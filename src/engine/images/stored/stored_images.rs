@@ -11,21 +11,21 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use crate::engine::image_cache::{Entry, EntryFacts, EntryType, ImageStore, Key, Shown, StoredKinds};
-use crate::engine::images::enhancement::enhancers::{EnhancerModels, Model};
-use crate::engine::images::frames::{Source, SourceFrame};
-use crate::engine::images::notes::{self, ShownObjects};
-use crate::engine::images::recipes::{ImageKeyFacts, Maker, Recipe};
-use crate::error::Result;
-use crate::pictures::{Payload, PayloadFormat};
-use crate::types::manifests::PngForm;
-use crate::types::questions::PixelBox;
-use crate::types::{Condition, Digest, FrameId, Thumbnail};
-use darkqa_enhance::{self, ImageUse, ProbeFindings};
+use crate::image_cache::{Entry, EntryFacts, EntryType, ImageStore, Key, Shown, StoredKinds};
+use crate::images::enhancement::enhancers::{EnhancerModels, Model};
+use crate::images::frames::{Source, SourceFrame};
+use crate::images::notes::{self, ShownObjects};
+use crate::images::recipes::{ImageKeyFacts, Maker, Recipe};
+use darkqa_base::error::Result;
+use darkqa_base::types::manifests::PngForm;
+use darkqa_base::types::questions::PixelBox;
+use darkqa_base::types::{Condition, Digest, FrameId, Thumbnail};
+use darkqa_enhance::{ImageUse, ProbeFindings};
+use darkqa_pictures::{Payload, PayloadFormat};
 
 /// The image store, with the settings that decide images besides their recipes.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct StoredImages<'a> {
+pub struct StoredImages<'a> {
     store: &'a ImageStore,
     maker: &'a Maker,
     png: PngForm,
@@ -47,12 +47,12 @@ struct StoredRecipe<'a> {
 }
 
 impl<'a> StoredImages<'a> {
-    pub(crate) fn new(store: &'a ImageStore, maker: &'a Maker, png: PngForm) -> Self {
+    pub fn new(store: &'a ImageStore, maker: &'a Maker, png: PngForm) -> Self {
         Self { store, maker, png }
     }
 
     /// The findings about enhancers in the same store.
-    pub(crate) fn findings(self) -> StoredFindings<'a> {
+    pub fn findings(self) -> StoredFindings<'a> {
         StoredFindings::new(self.store, self.maker)
     }
 
@@ -60,7 +60,7 @@ impl<'a> StoredImages<'a> {
     ///
     /// # Errors
     /// If a frame cannot be shown in the condition.
-    pub(crate) fn has_all(self, recipe: &Recipe, source: &Source, condition: &Condition) -> Result<bool> {
+    pub fn has_all(self, recipe: &Recipe, source: &Source, condition: &Condition) -> Result<bool> {
         if condition.photograph().is_some() {
             // Photographs in the dark are not stored.
             return Ok(false);
@@ -78,7 +78,7 @@ impl<'a> StoredImages<'a> {
     ///
     /// # Errors
     /// If the recipe lacks the noise profile of the condition.
-    pub(crate) fn place(
+    pub fn place(
         self,
         recipe: &Recipe,
         source: &FrameId,
@@ -119,7 +119,7 @@ impl<'a> StoredImages<'a> {
 
 /// The place of one image in the store, or of its similarity to the clean frame.
 #[derive(Debug, Clone)]
-pub(crate) struct StoredPlace<'a> {
+pub struct StoredPlace<'a> {
     store: &'a ImageStore,
     image: Key,
     /// Key of the similarity alone; `None` if the image is stored, whose notes include it.
@@ -129,27 +129,27 @@ pub(crate) struct StoredPlace<'a> {
 
 /// Similarity of an image to its clean frame, both in the size sent; `None` for a measure that is undefined.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub(crate) struct Similarity {
+pub struct Similarity {
     /// PSNR in dB; undefined for equal images.
-    pub(crate) psnr: Option<f64>,
+    pub psnr: Option<f64>,
     /// SSIM; undefined for images smaller than its window.
-    pub(crate) ssim: Option<f64>,
+    pub ssim: Option<f64>,
 }
 
 /// Notes about an image from the time it was made, stored with it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub(crate) struct StoredNotes {
+pub struct StoredNotes {
     /// The image's part of its enhancer's usage note; `None` without an enhancer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) enhanced: Option<ImageUse>,
+    pub enhanced: Option<ImageUse>,
     /// Similarity to the clean frame; `None` if it was not measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) similarity: Option<Similarity>,
+    pub similarity: Option<Similarity>,
 }
 
 /// Parts of an image that a caller needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Needed {
+pub enum Needed {
     /// Only the image file.
     Image,
     /// The image file and its similarity to the clean frame.
@@ -157,14 +157,14 @@ pub(crate) enum Needed {
 }
 
 /// An image from the store.
-pub(crate) struct StoredImage {
-    pub(crate) payload: Payload,
-    pub(crate) notes: StoredNotes,
+pub struct StoredImage {
+    pub payload: Payload,
+    pub notes: StoredNotes,
 }
 
 impl<'a> StoredPlace<'a> {
     /// True if the store keeps the image itself.
-    pub(crate) fn keeps_image(&self) -> bool {
+    pub fn keeps_image(&self) -> bool {
         self.similarity.is_none()
     }
 
@@ -174,7 +174,7 @@ impl<'a> StoredPlace<'a> {
     }
 
     /// Reads the image; `None` if it or a needed note is missing. The recipe gives the file format.
-    pub(crate) fn read(&self, recipe: &Recipe, needed: Needed) -> Option<StoredImage> {
+    pub fn read(&self, recipe: &Recipe, needed: Needed) -> Option<StoredImage> {
         if self.similarity.is_some() {
             return None;
         }
@@ -192,7 +192,7 @@ impl<'a> StoredPlace<'a> {
     }
 
     /// Similarity of the image to its clean frame; `None` if the store does not have it without the image.
-    pub(crate) fn similarity(&self) -> Option<Similarity> {
+    pub fn similarity(&self) -> Option<Similarity> {
         let key = self.similarity.as_ref()?;
         let mut similarity = None;
         self.store.get(key, EntryType::Measures, |entry| {
@@ -204,7 +204,7 @@ impl<'a> StoredPlace<'a> {
     }
 
     /// The place of the thumbnail of a frame in a condition, with crops of these objects.
-    pub(crate) fn thumbnail(
+    pub fn thumbnail(
         &self,
         frame: &FrameId,
         condition: &Condition,
@@ -215,7 +215,7 @@ impl<'a> StoredPlace<'a> {
 
     /// Adds an image and its notes to the store, or the similarity alone if such images are not stored. `took` is the
     /// time to make it.
-    pub(crate) fn write(&self, image: &Payload, notes: &StoredNotes, took: Duration) {
+    pub fn write(&self, image: &Payload, notes: &StoredNotes, took: Duration) {
         let facts = EntryFacts::new(self.shown.clone(), took.as_millis() as u64, serde_json::json!(notes));
         if let Some(key) = &self.similarity {
             if notes.similarity.is_some() {
@@ -234,7 +234,7 @@ impl<'a> StoredPlace<'a> {
 
 /// The place of the thumbnail of an image in the store.
 #[derive(Debug)]
-pub(crate) struct ThumbnailPlace<'a> {
+pub struct ThumbnailPlace<'a> {
     store: &'a ImageStore,
     key: Key,
     shown: Shown,
@@ -255,7 +255,7 @@ struct ThumbnailRecipe<'a> {
 
 impl<'a> ThumbnailPlace<'a> {
     /// The place of the thumbnail of the image with this key; `None` if no key can be made.
-    pub(crate) fn new(
+    pub fn new(
         store: &'a ImageStore,
         image: &Key,
         shown: &Shown,
@@ -276,7 +276,7 @@ impl<'a> ThumbnailPlace<'a> {
     }
 
     /// Reads the thumbnail of the image with this digest; `None` if the store does not have it.
-    pub(crate) fn read(&self, image: Digest) -> Option<Thumbnail> {
+    pub fn read(&self, image: Digest) -> Option<Thumbnail> {
         let mut stored = None;
         self.store.get(&self.key, EntryType::Thumbnail, |entry| {
             let read: Option<Thumbnail> = serde_json::from_slice(&entry.image).ok();
@@ -287,7 +287,7 @@ impl<'a> ThumbnailPlace<'a> {
     }
 
     /// Adds a thumbnail that took this many milliseconds to make.
-    pub(crate) fn write(&self, thumbnail: &Thumbnail, milliseconds: u64) {
+    pub fn write(&self, thumbnail: &Thumbnail, milliseconds: u64) {
         let entry = Entry {
             image: serde_json::json!(thumbnail).to_string().into_bytes(),
             size: [0, 0],
@@ -299,7 +299,7 @@ impl<'a> ThumbnailPlace<'a> {
 
 /// Findings in the image store that were made with one set of enhancer settings.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct StoredFindings<'a> {
+pub struct StoredFindings<'a> {
     store: &'a ImageStore,
     maker: &'a Maker,
 }
@@ -316,7 +316,7 @@ struct FindingsRecipe<'a> {
 }
 
 impl<'a> StoredFindings<'a> {
-    pub(crate) fn new(store: &'a ImageStore, maker: &'a Maker) -> Self {
+    pub fn new(store: &'a ImageStore, maker: &'a Maker) -> Self {
         Self { store, maker }
     }
 
@@ -334,7 +334,7 @@ impl<'a> StoredFindings<'a> {
     ///
     /// # Errors
     /// If a sidecar has a number that is infinite or NaN.
-    pub(crate) fn has_all(self, models: &EnhancerModels<'_>) -> Result<bool> {
+    pub fn has_all(self, models: &EnhancerModels<'_>) -> Result<bool> {
         for model in models.models() {
             if !self.store.contains(&self.key(model, None)?) {
                 return Ok(false);
@@ -347,7 +347,7 @@ impl<'a> StoredFindings<'a> {
     ///
     /// # Errors
     /// If a frame cannot be shown in one of its conditions, or a sidecar has a number that is infinite or NaN.
-    pub(crate) fn place(
+    pub fn place(
         self,
         recipe: &Recipe,
         model: &Model,
@@ -386,7 +386,7 @@ fn middle_frame_facts<'a>(
 
 /// Location of the findings of a probe in the image store.
 #[derive(Debug, Clone)]
-pub(crate) struct FindingsPlace<'a> {
+pub struct FindingsPlace<'a> {
     store: &'a ImageStore,
     /// Key of the entry that marks the model as opened.
     opened_key: Key,
@@ -397,7 +397,7 @@ pub(crate) struct FindingsPlace<'a> {
 
 impl FindingsPlace<'_> {
     /// Reads the findings; `None` if the store does not have them.
-    pub(crate) fn read(&self) -> Option<ProbeFindings> {
+    pub fn read(&self) -> Option<ProbeFindings> {
         let mut findings: Option<ProbeFindings> = None;
         self.store.get(&self.probe_key, EntryType::Probe, |entry| {
             findings = serde_json::from_value(entry.facts.notes.clone()).ok();
@@ -407,7 +407,7 @@ impl FindingsPlace<'_> {
     }
 
     /// Writes the findings, then marks the model as opened. `took` is the duration of opening and probing.
-    pub(crate) fn write(&self, findings: &ProbeFindings, took: Duration) {
+    pub fn write(&self, findings: &ProbeFindings, took: Duration) {
         let milliseconds = took.as_millis() as u64;
         for (key, milliseconds, notes) in [
             (&self.probe_key, milliseconds, serde_json::json!(findings)),

@@ -2,10 +2,10 @@
 //! accuracy by level; accuracy raw and with each enhancer, also of a data set that was photographed in the dark.
 
 use super::{ACCURACY, FigureBuilder, FigureSpec};
-use crate::report::charts::chart::{Chart, LineContent, LineItems, LineStyle, Panel, PlotLine};
-use crate::report::text::words::family as family_name;
-use crate::types::questions::{FAMILIES, FamilyAnswers};
-use crate::types::{AxisLevel, Family, SetLight, Variant, View};
+use crate::charts::chart::{Chart, LineContent, LineItems, LineStyle, Panel, PlotLine};
+use crate::text::words::family as family_name;
+use darkqa_base::types::questions::{FAMILIES, FamilyAnswers};
+use darkqa_base::types::{AxisLevel, Family, SetLight, Variant, View};
 use darkqa_score::answers::confusion::{Confusion, Hallucination};
 use darkqa_score::calibration::Calibration;
 use darkqa_score::choice::ParsingMode;

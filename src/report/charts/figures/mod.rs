@@ -11,25 +11,25 @@ mod tables;
 
 use std::collections::BTreeSet;
 
-use crate::report::charts::chart::{Chart, DarkMark, LineContent, LineItems, LineStyle, Panel, PlotLine, Scale};
-use crate::report::text::words::{family as family_name, light_with, marked_reference, names_enhancer};
-use crate::types::degradations::{Axis, Kind};
-use crate::types::text::counted;
-use crate::types::{AxisLevel, EnhancerName, Family, Variant, View};
+use crate::charts::chart::{Chart, DarkMark, LineContent, LineItems, LineStyle, Panel, PlotLine, Scale};
+use crate::text::words::{family as family_name, light_with, marked_reference, names_enhancer};
+use darkqa_base::types::degradations::{Axis, Kind};
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{AxisLevel, EnhancerName, Family, Variant, View};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::{CHANCE, ModelInCondition, models_under_test, pooled_models};
 
-pub(crate) use names::{DisplayNames, KnownNames, short_form};
-pub(crate) use overview::{OverviewPanels, overview};
-pub(crate) use split::split;
-pub(crate) use story::{StoryCurves, story_curves};
-pub(crate) use tables::{missing_threshold_message, paper_tables};
+pub use names::{DisplayNames, KnownNames, short_form};
+pub use overview::{OverviewPanels, overview};
+pub use split::split;
+pub use story::{StoryCurves, story_curves};
+pub use tables::{missing_threshold_message, paper_tables};
 
 /// Name, caption and chart of a figure that is not yet drawn.
 #[derive(Debug, Clone)]
-pub(crate) struct FigureSpec {
+pub struct FigureSpec {
     /// Name of the figure in files.
     pub name: &'static str,
     /// Caption without the note of the chart.
@@ -38,7 +38,7 @@ pub(crate) struct FigureSpec {
 }
 
 /// Names of all figures of multiple-choice questions, in the order of a report.
-pub(crate) const FIGURES: [&str; 10] = [
+pub const FIGURES: [&str; 10] = [
     "accuracy",
     "variants",
     "enhancers",
@@ -52,7 +52,7 @@ pub(crate) const FIGURES: [&str; 10] = [
 ];
 
 /// All figures that have data. `names` sets the displayed names and the order of models and enhancers.
-pub(crate) fn figure_specs(findings: &Findings<'_>, names: &DisplayNames) -> Vec<FigureSpec> {
+pub fn figure_specs(findings: &Findings<'_>, names: &DisplayNames) -> Vec<FigureSpec> {
     let builder = FigureBuilder::new(findings, names);
     let charts = [
         ("accuracy", builder.accuracy()),

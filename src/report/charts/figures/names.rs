@@ -2,13 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::error::{Error, Result};
-use crate::report::text::words::family as family_name;
+use crate::text::words::family as family_name;
+use darkqa_base::error::{Error, Result};
 use darkqa_score::findings::Findings;
 
 /// Display names and order for figures. The default keeps the names and the order of the runs.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct DisplayNames {
+pub struct DisplayNames {
     /// Display name by recorded name.
     labels: BTreeMap<String, String>,
     /// Recorded names of the models that are displayed in their short form.
@@ -21,14 +21,14 @@ pub(crate) struct DisplayNames {
 
 /// Names that occur in the runs.
 #[derive(Debug, Clone)]
-pub(crate) struct KnownNames {
+pub struct KnownNames {
     models: BTreeSet<String>,
     enhancers: BTreeSet<String>,
     families: BTreeSet<String>,
 }
 
 impl KnownNames {
-    pub(crate) fn from_findings(findings: &Findings<'_>) -> Self {
+    pub fn from_findings(findings: &Findings<'_>) -> Self {
         let subjects = &findings.grid.subjects;
         Self {
             models: subjects
@@ -47,7 +47,7 @@ impl KnownNames {
 }
 
 /// Short form of a model's name, as on the page: without "script:", folders and the file extension.
-pub(crate) fn short_form(name: &str) -> &str {
+pub fn short_form(name: &str) -> &str {
     let bare = name.strip_prefix("script:").unwrap_or(name);
     let bare = match bare.rsplit_once('/') {
         Some((_, last)) if !last.is_empty() => last,
@@ -73,7 +73,7 @@ impl DisplayNames {
     ///
     /// # Errors
     /// If the runs lack a given name, if a name has two labels, or if two names would become the same.
-    pub(crate) fn new(
+    pub fn new(
         labels: &[(String, String)],
         order: &[String],
         black: Option<&String>,
@@ -131,7 +131,7 @@ impl DisplayNames {
     }
 
     /// Sentence that explains the short names of models; empty without any.
-    pub(crate) fn short_names_note(&self) -> String {
+    pub fn short_names_note(&self) -> String {
         let forms: Vec<String> =
             self.shortened.iter().map(|model| format!("{} is {model}", self.display_name(model))).collect();
         match &*forms {

@@ -3,18 +3,18 @@
 use std::fmt::Write;
 
 use super::{ACCURACY, DisplayNames, FigureBuilder, horizontal_lines_note};
-use crate::report::charts::chart::{Chart, LineContent, LineItems, LineStyle, Panel, PlotLine, Scale};
-use crate::types::degradations::{Axis, Kind};
-use crate::types::{AxisLevel, EnhancerName, Variant};
+use crate::charts::chart::{Chart, LineContent, LineItems, LineStyle, Panel, PlotLine, Scale};
+use darkqa_base::types::degradations::{Axis, Kind};
+use darkqa_base::types::{AxisLevel, EnhancerName, Variant};
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::CHANCE;
 
 /// A chart with its caption, or the reason why there is none.
-pub(crate) type PanelChart = Result<(String, Chart), &'static str>;
+pub(super) type PanelChart = Result<(String, Chart), &'static str>;
 
 /// Charts of the overview, one panel each, and the condition of its sample images.
 #[derive(Debug, Clone)]
-pub(crate) struct OverviewPanels {
+pub struct OverviewPanels {
     /// Name of each chart, and the chart or the reason why there is none.
     pub charts: Vec<(&'static str, PanelChart)>,
     /// Variant of the sample images; `None` if no dark image was asked.
@@ -27,7 +27,7 @@ pub(crate) struct OverviewPanels {
 
 /// Panels of a run: accuracy of each model, mean over the models by variant, and mean over the models raw and with each
 /// enhancer.
-pub(crate) fn overview(findings: &Findings<'_>, names: &DisplayNames) -> OverviewPanels {
+pub fn overview(findings: &Findings<'_>, names: &DisplayNames) -> OverviewPanels {
     let builder = FigureBuilder::new(findings, names);
     let variant = builder.main_variant();
     let enhancer = builder.enhancers.first().map(|name| {

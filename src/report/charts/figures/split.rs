@@ -1,13 +1,13 @@
 //! Division of panels with many curves into several panels: [`split`].
 
-use crate::report::charts::chart::{Panel, PlotLine};
+use crate::charts::chart::{Panel, PlotLine};
 
 /// Maximum number of curves per panel: the number of colours in the palette.
 const MAX_CURVES: usize = 6;
 
 /// Divides panels so that each has at most [`MAX_CURVES`] curves. A line that is not a curve stays with the curves of
 /// its model; if its model has no curve, the line appears in every part.
-pub(crate) fn split(panels: Vec<Panel>) -> Vec<Panel> {
+pub fn split(panels: Vec<Panel>) -> Vec<Panel> {
     panels.into_iter().flat_map(split_panel).collect()
 }
 
@@ -45,7 +45,7 @@ fn share_model(curves: &[PlotLine], line: &PlotLine) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::charts::chart::{LineContent, LineStyle};
+    use crate::charts::chart::{LineContent, LineStyle};
 
     fn line(name: &str, content: LineContent, model: Option<&str>) -> PlotLine {
         PlotLine { name: name.to_owned(), style: LineStyle(0), content, model: model.map(str::to_owned), items: None }

@@ -1,15 +1,15 @@
 //! Curves for the story image, which shows one item and the accuracy over all items: [`story_curves`].
 
 use super::{DisplayNames, FigureBuilder};
-use crate::report::charts::chart::{LineContent, LineItems, LineStyle, PlotLine};
-use crate::report::text::words::light;
-use crate::types::{EnhancerName, Variant};
+use crate::charts::chart::{LineContent, LineItems, LineStyle, PlotLine};
+use crate::text::words::light;
+use darkqa_base::types::{EnhancerName, Variant};
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::CHANCE;
 
 /// Accuracy by level in one variant: each model raw and with each enhancer.
 #[derive(Debug, Clone)]
-pub(crate) struct StoryCurves {
+pub struct StoryCurves {
     /// Main variant of the run: sensor noise, if it was asked.
     pub variant: Variant,
     /// Text for the variant.
@@ -23,7 +23,7 @@ pub(crate) struct StoryCurves {
 }
 
 /// Curves of a run; `None` if no model was shown a dark image.
-pub(crate) fn story_curves(findings: &Findings<'_>) -> Option<StoryCurves> {
+pub fn story_curves(findings: &Findings<'_>) -> Option<StoryCurves> {
     let builder = FigureBuilder::new(findings, &DisplayNames::default());
     let variant = builder.main_variant()?;
     let mut lines = Vec::new();

@@ -5,13 +5,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{DisplayNames, FigureBuilder, FigureSpec};
-use crate::report::charts::chart::{Chart, LineContent, LineStyle, Panel, PlotLine, Scale};
-use crate::report::tables::missing_threshold_reason;
-use crate::report::text::table::{Column, ColumnHeads, ColumnKind, Table, TableCell, TableRow};
-use crate::report::text::words::{family as family_name, stops};
-use crate::types::degradations::{Axis, Kind};
-use crate::types::text::counted;
-use crate::types::{AxisLevel, EnhancerName, Family, Variant, View};
+use crate::charts::chart::{Chart, LineContent, LineStyle, Panel, PlotLine, Scale};
+use crate::tables::missing_threshold_reason;
+use crate::text::table::{Column, ColumnHeads, ColumnKind, Table, TableCell, TableRow};
+use crate::text::words::{family as family_name, stops};
+use darkqa_base::types::degradations::{Axis, Kind};
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{AxisLevel, EnhancerName, Family, Variant, View};
 use darkqa_score::accuracies::Curve;
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::PooledKind;
@@ -24,7 +24,7 @@ const BELOW: &str = "↓: detected to be below the answers without images.";
 
 /// All tables that have data: accuracy by level, accuracy by family at L0 and at the darkest level, and a table for
 /// each enhancer.
-pub(crate) fn paper_tables(findings: &Findings<'_>, names: &DisplayNames) -> Vec<Table> {
+pub fn paper_tables(findings: &Findings<'_>, names: &DisplayNames) -> Vec<Table> {
     let builder = FigureBuilder::new(findings, names);
     let variants = builder.tested_variants();
     let mut tables: Vec<Table> = variants.iter().map(|variant| builder.by_level(variant)).collect();
@@ -260,7 +260,7 @@ const NAMES: [(&str, Axis); 2] = [("thresholds", Axis::LIGHT), ("blur_thresholds
 
 /// Message that a threshold figure is missing because no curve has a threshold, with the reasons; `None` if that is not
 /// the cause.
-pub(crate) fn missing_threshold_message(findings: &Findings<'_>, figure: &str) -> Option<String> {
+pub fn missing_threshold_message(findings: &Findings<'_>, figure: &str) -> Option<String> {
     let (_, axis) = NAMES.into_iter().find(|(name, _)| *name == figure)?;
     let reasons: BTreeSet<String> = curves_on(findings, axis)
         .filter_map(|curve| curve.summary.threshold.as_ref().err())

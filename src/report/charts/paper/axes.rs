@@ -3,7 +3,7 @@
 use super::font::Font;
 use super::look::Look;
 use super::sheet::{Anchor, GRID, Point, Sheet, TextDirection};
-use crate::report::charts::chart::{INK, LineContent, Panel, Scale};
+use crate::charts::chart::{INK, LineContent, Panel, Scale};
 
 /// Distance between the baselines of two lines in em.
 const LEADING: f64 = 1.15;
@@ -359,10 +359,10 @@ impl<'a> Axes<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::charts::chart::{LineStyle, PlotLine};
-    use crate::report::charts::paper::look::column_look as look;
-    use crate::types::degradations::Kind;
-    use crate::types::{AxisLevel, Severity};
+    use crate::charts::chart::{LineStyle, PlotLine};
+    use crate::charts::paper::look::column_look as look;
+    use darkqa_base::types::degradations::Kind;
+    use darkqa_base::types::{AxisLevel, Severity};
     use darkqa_score::estimate::Estimate;
 
     /// Names of the labelled levels on an axis of L0 and the given exposure drops, in hundredths of an EV.

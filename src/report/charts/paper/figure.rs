@@ -6,8 +6,8 @@ use super::legend::Legend;
 use super::page::figure_parts;
 use super::panel::{Medium, PanelDrawing};
 use super::{FigureColours, Look, Sheet, svg};
-use crate::error::{Error, Result};
-use crate::report::charts::chart::{Chart, Figure, Panel};
+use crate::charts::chart::{Chart, Figure, Panel};
+use darkqa_base::error::{Error, Result};
 
 /// Width in points of a figure with several panels side by side or with names: an A4 page between margins of 15 mm.
 const WIDE: f64 = 510.0;
@@ -25,7 +25,7 @@ const FONT_SIZE: f64 = 8.5;
 ///
 /// # Errors
 /// None in practice: only an embedded image can fail, and charts have none.
-pub(crate) fn figure(name: &'static str, caption: &str, chart: &Chart) -> Result<Figure> {
+pub fn figure(name: &'static str, caption: &str, chart: &Chart) -> Result<Figure> {
     let is_narrow = chart.columns.min(chart.panels.len()) == 1 && !chart.panels.iter().any(Panel::has_names);
     Ok(Figure {
         name,
@@ -39,7 +39,7 @@ pub(crate) fn figure(name: &'static str, caption: &str, chart: &Chart) -> Result
 ///
 /// # Errors
 /// None in practice: only an embedded image can fail, and the panels have none.
-pub(crate) fn point_figure(panels: Vec<Panel>) -> Result<String> {
+pub fn point_figure(panels: Vec<Panel>) -> Result<String> {
     let columns = panels.len().max(1);
     let look = look(PANEL * columns as f64);
     let parts = panels.into_iter().map(|panel| single_panel(panel, &column_look(columns, &look)));
@@ -50,7 +50,7 @@ pub(crate) fn point_figure(panels: Vec<Panel>) -> Result<String> {
 ///
 /// # Errors
 /// None in practice: only an embedded image can fail, and the panels have none.
-pub(crate) fn count_figure(panels: Vec<Panel>) -> Result<String> {
+pub fn count_figure(panels: Vec<Panel>) -> Result<String> {
     to_svg(pack(panels, &look(WIDE)))
 }
 
@@ -77,7 +77,7 @@ pub(super) fn fitting_columns(chart: &Chart, look: &Look) -> usize {
 
 /// Draws a chart as a sheet, with the legend below the panels. The first panel of a row has the title of the vertical
 /// axes. The note of the chart is not drawn; it belongs to the caption.
-pub(crate) fn sheet(chart: &Chart, look: &Look) -> Sheet {
+pub fn sheet(chart: &Chart, look: &Look) -> Sheet {
     let em = look.font_size;
     let legend = Legend::for_chart(chart, look);
     let columns = fitting_columns(chart, look);
@@ -168,10 +168,10 @@ pub(super) fn arrange_in_rows(parts: impl IntoIterator<Item = Sheet>, columns: u
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::charts::chart::{LineContent, LineStyle, PlotLine, Scale};
-    use crate::report::charts::paper::font::Font;
-    use crate::report::charts::paper::look::column_look as look;
-    use crate::report::charts::paper::sheet::{Point, Shape};
+    use crate::charts::chart::{LineContent, LineStyle, PlotLine, Scale};
+    use crate::charts::paper::font::Font;
+    use crate::charts::paper::look::column_look as look;
+    use crate::charts::paper::sheet::{Point, Shape};
     use darkqa_score::estimate::Estimate;
 
     #[test]

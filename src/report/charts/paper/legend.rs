@@ -3,7 +3,7 @@
 use super::font::Font;
 use super::look::Look;
 use super::sheet::{Anchor, Point, Sheet, Stroke};
-use crate::report::charts::chart::{Chart, LineContent, LineStyle, PlotLine};
+use crate::charts::chart::{Chart, LineContent, LineStyle, PlotLine};
 
 /// Kind of sample before a name in a legend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,11 +1,11 @@
 //! Style of a figure: its width, font size and palette ([`Look`]), and the stroke and marker of each line ([`Pen`]).
 
 use super::sheet::{Colour, PAPER, Point, Shape, Sheet, Stroke};
-use crate::report::charts::chart::{COLOURS, INK, LineStyle};
+use crate::charts::chart::{COLOURS, INK, LineStyle};
 
 /// The colours of figures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum FigureColours {
+pub enum FigureColours {
     /// Six colours that can be distinguished with any colour vision
     #[value(name = "colour", alias = "color")]
     Colour,
@@ -26,7 +26,7 @@ const DOTS: &[f64] = &[1.0, 2.2];
 
 /// Width, font size and colours of a figure.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Look {
+pub struct Look {
     /// Width of the figure in points.
     pub width: f64,
     /// Font size in points; tick labels are smaller.

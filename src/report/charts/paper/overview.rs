@@ -9,17 +9,17 @@ use super::figure::{arrange_in_rows, column_look, sheet};
 use super::font::Font;
 use super::look::Look;
 use super::sheet::{Anchor, PAPER, Point, Shape, Sheet, Stroke, TextDirection};
-use crate::error::{Error, Result};
-use crate::report::charts::chart::Chart;
-use crate::report::charts::figures::OverviewPanels;
-use crate::types::{AxisLevel, Condition, EnhancerName, FrameId, Rgb, Thumbnail, Variant};
+use crate::charts::chart::Chart;
+use crate::charts::figures::OverviewPanels;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::{AxisLevel, Condition, EnhancerName, FrameId, Rgb, Thumbnail, Variant};
 
 /// Number of panels in a row.
 const COLUMNS: usize = 2;
 
 /// The drawn overview, its caption, and the panels that are missing.
 #[derive(Debug)]
-pub(crate) struct OverviewSheet {
+pub struct OverviewSheet {
     pub sheet: Sheet,
     /// Letter and caption of each panel.
     pub caption: String,
@@ -34,7 +34,7 @@ pub(crate) struct OverviewSheet {
 ///
 /// # Errors
 /// If a thumbnail that a run stored cannot be decoded.
-pub(crate) fn overview_sheet(
+pub fn overview_sheet(
     panels: &OverviewPanels,
     thumbnails: &[Thumbnail],
     look: &Look,
@@ -81,7 +81,7 @@ const LEVELS: [&str; 4] = ["L0", "L1", "L3", "L5"];
 const GAP: f64 = 2.0;
 
 /// Decoder of an image in a `data:` URL.
-pub(crate) type DecodePixels<'a> = &'a dyn Fn(&str) -> Result<Rgb>;
+pub(super) type DecodePixels<'a> = &'a dyn Fn(&str) -> Result<Rgb>;
 
 /// Sheet of one frame with its caption, or the reason why there is none.
 type Samples = std::result::Result<(Sheet, String), &'static str>;

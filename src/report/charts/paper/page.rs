@@ -9,11 +9,11 @@ use super::panel::{Medium, PanelDrawing};
 use super::sheet::{Anchor, Point, Shape, ShapeGroup, Sheet};
 use super::svg::{escape_attribute, page_svg};
 use super::{FigureColours, Look};
-use crate::error::Result;
-use crate::report::charts::chart::{Chart, FigureParts, INK, LineContent, PageLine, PagePanel, Panel, PlotLine, Scale};
-use crate::report::charts::figures::short_form;
-use crate::report::charts::paper::font::Font;
-use crate::types::{Axis, AxisLevel};
+use crate::charts::chart::{Chart, FigureParts, INK, LineContent, PageLine, PagePanel, Panel, PlotLine, Scale};
+use crate::charts::figures::short_form;
+use crate::charts::paper::font::Font;
+use darkqa_base::error::Result;
+use darkqa_base::types::{Axis, AxisLevel};
 
 /// Size of a panel in its own units; the style sheet scales it.
 const LOOK: Look = Look { width: 340.0, font_size: 12.5, palette: FigureColours::Colour };
@@ -183,9 +183,9 @@ fn spread(positions: &[f64], step: f64, end: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::charts::chart::LineStyle;
-    use crate::types::Severity;
-    use crate::types::degradations::Kind;
+    use crate::charts::chart::LineStyle;
+    use darkqa_base::types::Severity;
+    use darkqa_base::types::degradations::Kind;
     use darkqa_score::estimate::Estimate;
 
     fn parts(line: PlotLine) -> FigureParts {

@@ -4,9 +4,9 @@ use super::axes::Axes;
 use super::legend::Legend;
 use super::look::Look;
 use super::sheet::{Anchor, Shape, ShapeGroup, Sheet, Stroke};
-use crate::report::charts::chart::{INK, LineContent, LineStyle, Panel, PlotLine, Scale};
-use crate::report::text::words::{percent, with_interval};
-use crate::types::AxisLevel;
+use crate::charts::chart::{INK, LineContent, LineStyle, Panel, PlotLine, Scale};
+use crate::text::words::{percent, with_interval};
+use darkqa_base::types::AxisLevel;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::threshold::Threshold;
 
@@ -274,13 +274,13 @@ impl PanelDrawing<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::charts::chart::Chart;
-    use crate::report::charts::paper::figure::sheet;
-    use crate::report::charts::paper::font::Font;
-    use crate::report::charts::paper::look::column_look as look;
-    use crate::report::charts::paper::sheet::{Point, TextDirection};
-    use crate::types::Severity;
-    use crate::types::degradations::Kind;
+    use crate::charts::chart::Chart;
+    use crate::charts::paper::figure::sheet;
+    use crate::charts::paper::font::Font;
+    use crate::charts::paper::look::column_look as look;
+    use crate::charts::paper::sheet::{Point, TextDirection};
+    use darkqa_base::types::Severity;
+    use darkqa_base::types::degradations::Kind;
 
     fn share(value: f64) -> Estimate {
         Estimate { value, low: value - 0.05, high: value + 0.03, n: 40 }

@@ -16,9 +16,9 @@ use subsetter::GlyphRemapper;
 
 use super::font::{FONT_FILE, Font};
 use super::sheet::{Colour, Point, Shape, Sheet, Stroke, TextDirection, TextLabel};
-use crate::error::{Error, Result};
-use crate::report::charts::chart::INK;
-use crate::types::Rgb;
+use crate::charts::chart::INK;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Rgb;
 
 /// Distance of a control point from its end point, in radii, of a Bézier curve for a quarter of a circle: 4 (√2 − 1) /
 /// 3.
@@ -31,7 +31,7 @@ const FONT: Name<'_> = Name(b"F");
 ///
 /// # Errors
 /// If the sheet has no area or the font cannot be embedded.
-pub(crate) fn pdf(sheet: &Sheet, title: &str) -> Result<Vec<u8>> {
+pub fn pdf(sheet: &Sheet, title: &str) -> Result<Vec<u8>> {
     let [width, height] = sheet.size.map(|length| length as f32);
     if !(width > 0.0 && height > 0.0) {
         return Err(Error::data("figure as PDF", format!("a figure of {width} × {height} points has no area")));
@@ -334,7 +334,7 @@ mod tests {
     use super::super::font::FONT_FILE;
     use super::super::sheet::Anchor;
     use super::*;
-    use crate::types::Rgb;
+    use darkqa_base::types::Rgb;
 
     fn sheet() -> Sheet {
         let mut sheet = Sheet { size: [100.0, 50.0], ..Sheet::default() };

@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use crate::error::{Error, Result};
-use crate::types::Rgb;
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Rgb;
 
 use super::font::Font;
 
 /// Position in points: distance from the left, and from the top.
-pub(crate) type Point = [f64; 2];
+pub(super) type Point = [f64; 2];
 
 /// Red, green and blue.
-pub(crate) type Colour = [u8; 3];
+pub(super) type Colour = [u8; 3];
 
 /// Colour of grid lines.
 pub(super) const GRID: Colour = [221, 221, 221];
@@ -20,7 +20,7 @@ pub(super) const PAPER: Colour = [255, 255, 255];
 
 /// A drawn figure: its shapes from the lowest to the topmost.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Sheet {
+pub struct Sheet {
     /// Width and height in points.
     pub size: [f64; 2],
     pub shapes: Vec<Shape>,
@@ -28,7 +28,7 @@ pub(crate) struct Sheet {
 
 /// Colour, width and dashes of a line.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Stroke {
+pub struct Stroke {
     pub colour: Colour,
     /// Width in points.
     pub width: f64,
@@ -45,7 +45,7 @@ impl Stroke {
 
 /// One shape of a figure.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Shape {
+pub enum Shape {
     /// An open line through points.
     Line {
         points: Vec<Point>,
@@ -80,7 +80,7 @@ pub(crate) enum Shape {
 /// Shapes that belong together. PDF and SVG files have the shapes alone; the page has the group with its class, data
 /// and title, for its style and its script.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct ShapeGroup {
+pub struct ShapeGroup {
     /// CSS classes.
     pub class: &'static str,
     /// Names and values of the attributes whose names begin with `data-`.
@@ -92,7 +92,7 @@ pub(crate) struct ShapeGroup {
 
 /// Text on one line.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct TextLabel {
+pub struct TextLabel {
     pub text: String,
     /// Start of the baseline: its left end, or its lower end if the text runs upwards.
     pub start: Point,
@@ -121,14 +121,14 @@ impl TextLabel {
 
 /// Direction in which a text runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum TextDirection {
+pub enum TextDirection {
     Right,
     Up,
 }
 
 /// Part of a text's baseline that is at its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Anchor {
+pub enum Anchor {
     Start,
     Middle,
     End,
@@ -229,7 +229,7 @@ impl Sheet {
     ///
     /// # Errors
     /// If the font lacks a character; the error names the text and the character.
-    pub(crate) fn check_characters(&self) -> Result<()> {
+    pub fn check_characters(&self) -> Result<()> {
         let font = Font::bundled();
         for shape in self.ungrouped() {
             let Shape::Label(TextLabel { text, .. }) = shape else {

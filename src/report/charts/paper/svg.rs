@@ -8,19 +8,19 @@ use base64::engine::general_purpose::STANDARD;
 
 use super::font::{FAMILIES, Font};
 use super::sheet::{Anchor, Colour, GRID, PAPER, Point, Shape, ShapeGroup, Sheet, Stroke, TextDirection, TextLabel};
-use crate::error::{Error, Result};
-use crate::report::charts::chart::{COLOURS, INK};
-use crate::types::Rgb;
-use crate::types::text::escape_hidden;
+use crate::charts::chart::{COLOURS, INK};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::Rgb;
+use darkqa_base::types::text::escape_hidden;
 
 /// Encoder of an image as PNG.
-pub(crate) type Png<'a> = &'a dyn Fn(&Rgb) -> Result<Vec<u8>>;
+pub(super) type Png<'a> = &'a dyn Fn(&Rgb) -> Result<Vec<u8>>;
 
 /// Writes a sheet as SVG, with its size in points.
 ///
 /// # Errors
 /// If an image cannot be encoded.
-pub(crate) fn svg(sheet: &Sheet, png: Png) -> Result<String> {
+pub fn svg(sheet: &Sheet, png: Png) -> Result<String> {
     let writer = SvgWriter { target: SvgTarget::File(png) };
     let [width, height] = sheet.size.map(|length| writer.number(length));
     let mut text = format!(

@@ -9,9 +9,9 @@ use std::ops::Range;
 
 use super::font::Font;
 use super::look::Look;
-use crate::report::text::latex::{MAX_ROWS, escape};
-use crate::report::text::table::{Column, ColumnKind, Table, TableCell, TableFormat, TableRow};
-use crate::report::text::words::{interval, words};
+use crate::text::latex::{MAX_ROWS, escape};
+use crate::text::table::{Column, ColumnKind, Table, TableCell, TableFormat, TableRow};
+use crate::text::words::{interval, words};
 use darkqa_score::estimate::Estimate;
 
 /// Font size of tables in points.
@@ -57,7 +57,7 @@ struct TableLayout {
 
 /// Writes the tables as files, by name, and returns the number of long tables: `tables.tex`, and `tables-full.tex` if
 /// some tables have more than forty rows.
-pub(crate) fn tables(all: &[Table], look: &Look, is_wide: bool) -> (Vec<(String, Vec<u8>)>, usize) {
+pub fn tables(all: &[Table], look: &Look, is_wide: bool) -> (Vec<(String, Vec<u8>)>, usize) {
     let (long, short): (Vec<&Table>, Vec<&Table>) = all.iter().partition(|table| table.rows.len() > MAX_ROWS);
     let float = if is_wide { "table*" } else { "table" };
     let mut text = format!("% Tables of darkqa-eval. In the preamble: \\usepackage{{booktabs}}\n{COMMANDS}");
@@ -312,8 +312,8 @@ fn long_table(table: &Table, width: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::charts::paper::FigureColours;
-    use crate::report::text::table::ColumnHeads;
+    use crate::charts::paper::FigureColours;
+    use crate::text::table::ColumnHeads;
 
     fn table(names: &[&str], columns: usize) -> Table {
         let cell = TableCell::Below(Estimate { value: 1.0, low: 0.788, high: 1.0, n: 40 });

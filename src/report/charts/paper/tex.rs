@@ -8,9 +8,9 @@ use super::legend::Legend;
 use super::look::Look;
 use super::panel::MAX_BANDS;
 use super::sheet::{Colour, Stroke};
-use crate::report::charts::chart::{Chart, LineContent, Panel, PlotLine};
-use crate::report::text::latex::escape;
-use crate::types::text::escape_hidden;
+use crate::charts::chart::{Chart, LineContent, Panel, PlotLine};
+use crate::text::latex::escape;
+use darkqa_base::types::text::escape_hidden;
 
 /// Space left of the first axes in a row, in em.
 const FIRST: f64 = 4.6;
@@ -24,7 +24,7 @@ const SAMPLE: f64 = 43.0;
 /// Maximum width of a text in the font of a paper, relative to Arial.
 const WIDER: f64 = 1.08;
 /// Writes a chart over levels as files by name: its source, and the data of each panel.
-pub(crate) fn tex(name: &str, chart: &Chart, look: &Look) -> Vec<(String, Vec<u8>)> {
+pub fn tex(name: &str, chart: &Chart, look: &Look) -> Vec<(String, Vec<u8>)> {
     let columns = fitting_columns(chart, look);
     let rows = chart.panels.len().div_ceil(columns);
     // Space for tick labels, and in the first column for the axis title.

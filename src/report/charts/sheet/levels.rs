@@ -6,12 +6,12 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::{CELL, GAP, LINE, SheetCanvas, fitted_size, letter_width, lines, mean_colour};
-use crate::types::degradations::Axis;
-use crate::types::{AxisLevel, Rgb};
+use darkqa_base::types::degradations::Axis;
+use darkqa_base::types::{AxisLevel, Rgb};
 
 /// Images of a frame at the levels of one axis.
 #[derive(Debug, Clone)]
-pub(crate) struct LevelBlock {
+pub struct LevelBlock {
     /// Levels from left to right, without L0.
     pub levels: Vec<AxisLevel>,
     pub rows: Vec<LevelRow>,
@@ -19,7 +19,7 @@ pub(crate) struct LevelBlock {
 
 /// Images of one kind of degradation with one noise profile.
 #[derive(Debug, Clone)]
-pub(crate) struct LevelRow {
+pub struct LevelRow {
     pub name: String,
     /// One image for each level of the block.
     pub images: Vec<LevelImage>,
@@ -27,7 +27,7 @@ pub(crate) struct LevelRow {
 
 /// Image at a level.
 #[derive(Debug, Clone)]
-pub(crate) struct LevelImage {
+pub struct LevelImage {
     pub image: Rgb,
     /// Difference in brightness to the clean frame, in EV; it selects the gain of the inset.
     pub dark_ev: f64,
@@ -45,7 +45,7 @@ const MIN_NAME_LETTERS: usize = 6;
 /// amplified". Multiplying the codes would make a bright room white, so we brighten linear light, and state that below
 /// the images.
 #[must_use]
-pub(crate) fn levels(clean: &Rgb, blocks: &[LevelBlock], foot: &str) -> Rgb {
+pub fn levels(clean: &Rgb, blocks: &[LevelBlock], foot: &str) -> Rgb {
     let size = fitted_size(clean);
     let [height, width] = size;
     let letters = blocks.iter().flat_map(|block| &block.rows).map(|row| row.name.chars().count()).max();
@@ -251,8 +251,8 @@ fn pixel_range(a: f64, b: f64, reach: f64) -> Range<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::Severity;
-    use crate::types::degradations::Kind;
+    use darkqa_base::types::Severity;
+    use darkqa_base::types::degradations::Kind;
 
     fn grey(height: usize, width: usize, code: u8) -> Rgb {
         Rgb::new(height, width, vec![code; height * width * 3]).unwrap()

@@ -14,13 +14,13 @@ use std::ops::Range;
 use ndarray::Array2;
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
-use crate::types::Rgb;
+use darkqa_base::types::Rgb;
 
-pub(crate) use levels::{LevelBlock, LevelImage, LevelRow, levels};
-pub(crate) use story::{Story, StoryCell, StoryMark, StoryRow, story};
+pub use levels::{LevelBlock, LevelImage, LevelRow, levels};
+pub use story::{Story, StoryCell, StoryMark, StoryRow, story};
 
 /// Version of the drawing code. Raise it when any pixel of a figure of levels or noise changes for the same images.
-pub(crate) const VERSION: u32 = 1;
+pub const VERSION: u32 = 1;
 
 /// Height of a line of text in pixels.
 const LINE: usize = RasterHeight::Size20.val();
@@ -155,7 +155,7 @@ fn covered_pixels(index: usize, scaled: usize, original: usize) -> Range<usize> 
 
 /// Noise term on the sensor.
 #[derive(Debug, Clone)]
-pub(crate) struct Signal {
+pub struct Signal {
     /// Label of the image.
     pub name: String,
     /// Values in ADU, height × width.
@@ -167,7 +167,7 @@ pub(crate) struct Signal {
 /// Each signal has its own grey scale: black is three standard deviations below its mean and white three above, written
 /// in ADU above the image. `foot` is written below all images.
 #[must_use]
-pub(crate) fn noise(signals: &[Signal], foot: &str) -> Rgb {
+pub fn noise(signals: &[Signal], foot: &str) -> Rgb {
     const COLUMNS: usize = 3;
     let (height, width) = signals
         .iter()
@@ -213,7 +213,7 @@ fn moments(adu: &Array2<f32>) -> [f64; 2] {
 
 /// Row of crops. All its images have the same size.
 #[derive(Debug, Clone)]
-pub(crate) struct CropRow<'a> {
+pub struct CropRow<'a> {
     /// Label of the row.
     pub name: String,
     /// One image for each column.
@@ -224,7 +224,7 @@ pub(crate) struct CropRow<'a> {
 
 /// Draws the middle of each image at full resolution, brightened by the gain of its row, below the column names.
 #[must_use]
-pub(crate) fn crops(columns: &[&str], rows: &[CropRow<'_>]) -> Rgb {
+pub fn crops(columns: &[&str], rows: &[CropRow<'_>]) -> Rgb {
     let height = CELL * 2 / 3;
     let step = [LINE + height + GAP, CELL + GAP];
     let mut sheet = SheetCanvas::new(GAP + LINE + rows.len() * step[0], GAP + columns.len().max(1) * step[1]);
@@ -258,14 +258,14 @@ const COLUMN: usize = 280;
 
 /// Column of a contact sheet: label, and images from top to bottom.
 #[derive(Debug)]
-pub(crate) struct ContactColumn<'a> {
-    pub(crate) label: String,
-    pub(crate) images: Vec<&'a Rgb>,
+pub struct ContactColumn<'a> {
+    pub label: String,
+    pub images: Vec<&'a Rgb>,
 }
 
 /// Draws a contact sheet. Images wider than a cell are scaled down by averaging pixels.
 #[must_use]
-pub(crate) fn contact(columns: &[ContactColumn<'_>]) -> Rgb {
+pub fn contact(columns: &[ContactColumn<'_>]) -> Rgb {
     let [height, width] = columns
         .iter()
         .flat_map(|column| &column.images)

@@ -3,8 +3,8 @@
 
 use super::levels::level_label;
 use super::{CELL, GAP, LINE, SheetCanvas, letter_width, mean_colour};
-use crate::report::charts::chart::{COLOURS, LineContent, LineStyle, PlotLine};
-use crate::types::{AxisLevel, Rgb};
+use crate::charts::chart::{COLOURS, LineContent, LineStyle, PlotLine};
+use darkqa_base::types::{AxisLevel, Rgb};
 use darkqa_score::estimate::Estimate;
 
 /// Maximum width of a sheet of six levels in pixels; a sheet of fewer levels is narrower.
@@ -19,7 +19,7 @@ const GREY: [u8; 3] = [110; 3];
 
 /// Mark below an image for the result of a reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum StoryMark {
+pub enum StoryMark {
     Right,
     Wrong,
     /// The reply is missing or could not be parsed.
@@ -39,7 +39,7 @@ impl StoryMark {
 
 /// Image of the item in one condition.
 #[derive(Debug, Clone)]
-pub(crate) struct StoryCell {
+pub struct StoryCell {
     pub image: Rgb,
     /// Name of each model, and its result.
     pub marks: Vec<(String, StoryMark)>,
@@ -47,7 +47,7 @@ pub(crate) struct StoryCell {
 
 /// Images of the item in one variant, raw or enhanced.
 #[derive(Debug, Clone)]
-pub(crate) struct StoryRow {
+pub struct StoryRow {
     pub name: String,
     /// One cell for each level; `None` if the item was not asked at the level.
     pub cells: Vec<Option<StoryCell>>,
@@ -55,7 +55,7 @@ pub(crate) struct StoryRow {
 
 /// Content of the image.
 #[derive(Debug, Clone)]
-pub(crate) struct Story {
+pub struct Story {
     /// The question and its choices, one on each line.
     pub question: Vec<String>,
     pub levels: Vec<AxisLevel>,
@@ -68,7 +68,7 @@ pub(crate) struct Story {
 
 /// Draws the image. Images of the item are scaled down by averaging pixels.
 #[must_use]
-pub(crate) fn story(story: &Story) -> Rgb {
+pub fn story(story: &Story) -> Rgb {
     let layout = StorySizes::new(story);
     let mut sheet = SheetCanvas::new(layout.height, layout.width);
     let mut top = GAP;
@@ -231,8 +231,8 @@ fn write_labels(sheet: &mut SheetCanvas, layout: &StorySizes, mut labels: Vec<(f
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::Severity;
-    use crate::types::degradations::Kind;
+    use darkqa_base::types::Severity;
+    use darkqa_base::types::degradations::Kind;
 
     fn level(severity: Severity) -> AxisLevel {
         AxisLevel::new(Kind::ALL[0], severity)

@@ -13,17 +13,17 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use serde_json::Value;
 
-use crate::ask::{ChangedSetting, ImageDetail, ImageTokenCheck, scaling_image_tokens};
-use crate::report::joined::combine::CombinedRuns;
-use crate::report::joined::join::{Joined, JoinedRun};
-use crate::report::joined::settings::joined_with_and;
-use crate::report::text::alert::{Alert, AlertKind};
-use crate::runs::renamed::{self, ADAPTED_FOR};
-use crate::types::degradations::Kind;
-use crate::types::flags::{read_word, setting_spelling};
-use crate::types::manifests::judge_flag;
-use crate::types::text::plural;
-use crate::types::{Condition, Degradation, Digest, QuestionId, RunQuestion, SetLight, Severity, TrialRef};
+use crate::joined::combine::CombinedRuns;
+use crate::joined::join::{Joined, JoinedRun};
+use crate::joined::settings::joined_with_and;
+use crate::text::alert::{Alert, AlertKind};
+use darkqa_ask::{ChangedSetting, ImageDetail, ImageTokenCheck, scaling_image_tokens};
+use darkqa_base::types::degradations::Kind;
+use darkqa_base::types::flags::{read_word, setting_spelling};
+use darkqa_base::types::manifests::judge_flag;
+use darkqa_base::types::text::plural;
+use darkqa_base::types::{Condition, Degradation, Digest, QuestionId, RunQuestion, SetLight, Severity, TrialRef};
+use darkqa_runs::renamed::{self, ADAPTED_FOR};
 use darkqa_score::answers::record::Detail;
 use darkqa_score::answers::{Independence, LitReply};
 use darkqa_score::model_in_condition::without_run;

@@ -18,16 +18,16 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::report::joined::join::{Joined, JoinedRun};
-use crate::report::joined::model_names::SplitModel;
-use crate::report::joined::settings::{
+use crate::joined::join::{Joined, JoinedRun};
+use crate::joined::model_names::SplitModel;
+use crate::joined::settings::{
     ENCODING, FlagValues, Setting, base_url, differing_settings, has_human_answers, identity_fields, joined_with_and,
     light_settings, remote_model_settings, without_explained,
 };
-use crate::report::text::alert::{Alert, AlertKind};
-use crate::types::manifests::RunManifest;
-use crate::types::text::{is_other_model, is_same_name, plural};
-use crate::types::{ChoiceDetail, Trials};
+use crate::text::alert::{Alert, AlertKind};
+use darkqa_base::types::manifests::RunManifest;
+use darkqa_base::types::text::{is_other_model, is_same_name, plural};
+use darkqa_base::types::{ChoiceDetail, Trials};
 use darkqa_score::answers::record::Detail;
 use darkqa_score::model_in_condition::without_run;
 

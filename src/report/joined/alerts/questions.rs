@@ -7,13 +7,13 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
-use crate::report::joined::combine::{CombinedRuns, frame_ties};
-use crate::report::joined::join::Joined;
-use crate::report::joined::settings::{has_human_answers, joined_with_and};
-use crate::report::text::alert::{Alert, AlertKind};
-use crate::report::text::words::family as family_name;
-use crate::types::text::{counted, excerpt};
-use crate::types::{Digest, FrameId, QuestionId, RunQuestion, TrialRef, View};
+use crate::joined::combine::{CombinedRuns, frame_ties};
+use crate::joined::join::Joined;
+use crate::joined::settings::{has_human_answers, joined_with_and};
+use crate::text::alert::{Alert, AlertKind};
+use crate::text::words::family as family_name;
+use darkqa_base::types::text::{counted, excerpt};
+use darkqa_base::types::{Digest, FrameId, QuestionId, RunQuestion, TrialRef, View};
 use darkqa_score::answers::record::Detail;
 use darkqa_score::cluster::{ClusterUnit, MIN_CLUSTERS};
 use darkqa_score::comparisons::PooledKind;
@@ -284,8 +284,8 @@ pub(super) fn rare_loss_alert(findings: &Findings<'_>) -> Option<Alert> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::sentences::tests::records::{answer, record, unanswered};
-    use crate::types::{Family, Record};
+    use crate::sentences::tests::records::{answer, record, unanswered};
+    use darkqa_base::types::{Family, Record};
     use darkqa_score::cluster::FrameTies;
 
     /// The record of an answer to a question whose first choice is true.

@@ -12,15 +12,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 
-use crate::ask::is_context_full;
-use crate::report::joined::combine::CombinedRuns;
-use crate::report::joined::enhancers::LenientChange;
-use crate::report::joined::join::JoinedRun;
-use crate::report::joined::settings::has_human_answers;
-use crate::report::text::alert::{Alert, AlertKind, MAX_UNREAD};
-use crate::report::text::words::failure_reason;
-use crate::types::text::counted;
-use crate::types::{
+use crate::joined::combine::CombinedRuns;
+use crate::joined::enhancers::LenientChange;
+use crate::joined::join::JoinedRun;
+use crate::joined::settings::has_human_answers;
+use crate::text::alert::{Alert, AlertKind, MAX_UNREAD};
+use crate::text::words::failure_reason;
+use darkqa_ask::is_context_full;
+use darkqa_base::types::text::counted;
+use darkqa_base::types::{
     AxisLevel, ChoiceDetail, Condition, FailureKind, Finish, OpenDetail, Record, StoredDetail, TrialRef, Trials,
     UnreadReason, Usage,
 };
@@ -263,7 +263,7 @@ pub(super) fn people_alerts(combined: &CombinedRuns) -> Vec<Alert> {
 const MAX_MISSING: f64 = 0.02;
 
 /// Numbers of missing replies and of all trials of a subject.
-pub(crate) type MissingCounts<'m> = (&'m ModelInCondition, [usize; 2]);
+pub(super) type MissingCounts<'m> = (&'m ModelInCondition, [usize; 2]);
 
 /// Numbers of missing replies of each subject with images.
 pub(super) fn counts(health: &[Health]) -> Vec<MissingCounts<'_>> {

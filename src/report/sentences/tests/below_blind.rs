@@ -1,9 +1,9 @@
 //! Expected sentences about models that are less often right with images than without.
 
 use super::{checked, finding};
-use crate::report::sentences::below_blind;
-use crate::types::degradations::Kind;
-use crate::types::{AxisLevel, Family, Severity, Variant};
+use crate::sentences::below_blind;
+use darkqa_base::types::degradations::Kind;
+use darkqa_base::types::{AxisLevel, Family, Severity, Variant};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::paired::{PairedComparison, Spread};
 use darkqa_score::comparisons::{Comparison, ComparisonKind, PooledFinding, PooledKind, Tested};

@@ -5,8 +5,8 @@ use rand::{RngExt as _, SeedableRng as _};
 
 use super::records::{record, unanswered};
 use super::simulation::{normals, percent, runs, set_answer};
-use crate::report::sentences::{Sentence, sentences};
-use crate::types::{ChoiceDetail, Condition, Family, Record};
+use crate::sentences::{Sentence, sentences};
+use darkqa_base::types::{ChoiceDetail, Condition, Family, Record};
 use darkqa_score::cluster::FrameTies;
 use darkqa_score::findings::Findings;
 

@@ -1,9 +1,9 @@
 //! Expected sentences about the confidence of models.
 
 use super::checked;
-use crate::report::sentences::below_blind::{Confidence, confidence};
-use crate::types::degradations::Kind;
-use crate::types::{AxisLevel, Severity, Variant};
+use crate::sentences::below_blind::{Confidence, confidence};
+use darkqa_base::types::degradations::Kind;
+use darkqa_base::types::{AxisLevel, Severity, Variant};
 use darkqa_score::calibration::{Calibration, RiskCoverage};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::Tested;

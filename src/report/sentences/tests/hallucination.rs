@@ -1,9 +1,9 @@
 //! Expected sentences about false answers and about one answer to most questions.
 
 use super::{checked, findings};
-use crate::report::sentences::hallucination::{self, TopAnswer};
-use crate::types::degradations::Kind;
-use crate::types::{AxisLevel, Family, Severity};
+use crate::sentences::hallucination::{self, TopAnswer};
+use darkqa_base::types::degradations::Kind;
+use darkqa_base::types::{AxisLevel, Family, Severity};
 use darkqa_score::answers::confusion::{AgainstClean, Collapse, FalseAnswer};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::Tested;

@@ -5,8 +5,8 @@ use rand::{RngExt as _, SeedableRng as _};
 
 use super::records::{answer, record, unanswered};
 use super::simulation::{percent, runs};
-use crate::report::sentences::{EffectDirection, sentences};
-use crate::types::{Condition, Family, Record, TrialOutcome};
+use crate::sentences::{EffectDirection, sentences};
+use darkqa_base::types::{Condition, Family, Record, TrialOutcome};
 use darkqa_score::cluster::FrameTies;
 use darkqa_score::comparisons::PooledKind;
 use darkqa_score::findings::Findings;

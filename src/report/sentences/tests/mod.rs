@@ -14,8 +14,8 @@ mod threshold;
 
 use super::sentence::{Sentence, level_runs};
 use super::{below_blind as below, darkness, pooled, sample};
-use crate::types::degradations::Kind;
-use crate::types::{AxisLevel, EnhancerName, Severity, Variant};
+use darkqa_base::types::degradations::Kind;
+use darkqa_base::types::{AxisLevel, EnhancerName, Severity, Variant};
 use darkqa_score::auc::Auc;
 use darkqa_score::cluster::{ClusterUnit, FrameTies};
 use darkqa_score::comparisons::{PooledDifference, PooledFinding, PooledKind, Tested};

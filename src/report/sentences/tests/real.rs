@@ -1,8 +1,8 @@
 //! Tests of the sentences about photographs in the dark, on synthetic records.
 
 use super::records::{of_kind, scripted};
-use crate::report::sentences::sentences;
-use crate::types::PhotoName;
+use crate::sentences::sentences;
+use darkqa_base::types::PhotoName;
 use darkqa_score::cluster::FrameTies;
 use darkqa_score::findings::Findings;
 use darkqa_score::photographs::PairDarkness;

@@ -1,8 +1,8 @@
 //! Sentences about synthetic records: which models and levels they name, count and leave out.
 
 use super::checked;
-use crate::report::sentences::{EffectDirection, Sentence, sentences};
-use crate::types::{
+use crate::sentences::{EffectDirection, Sentence, sentences};
+use darkqa_base::types::{
     ChoiceDetail, Condition, Digest, Family, FrameId, ModelListing, ParsedAnswer, QuestionId, Record, RunGroup,
     TrialOutcome, UnreadReason,
 };

@@ -7,8 +7,8 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::records::{answer, record, unanswered};
-use crate::report::sentences::{EffectDirection, Sentence, sentences};
-use crate::types::{ChoiceDetail, Condition, Family, FrameId, OptionProbabilities, QuestionId, Record};
+use crate::sentences::{EffectDirection, Sentence, sentences};
+use darkqa_base::types::{ChoiceDetail, Condition, Family, FrameId, OptionProbabilities, QuestionId, Record};
 use darkqa_score::accuracies::healths;
 use darkqa_score::cluster::{Clusters, FrameTies};
 use darkqa_score::comparisons::{PooledKind, baseline_rows};

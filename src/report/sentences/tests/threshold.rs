@@ -2,8 +2,8 @@
 
 use super::checked;
 use super::records::{answer, record, unanswered};
-use crate::report::sentences::sentences;
-use crate::types::{Condition, Family, Record};
+use crate::sentences::sentences;
+use darkqa_base::types::{Condition, Family, Record};
 use darkqa_score::cluster::FrameTies;
 use darkqa_score::findings::Findings;
 use darkqa_score::photographs::PhotographedSet;

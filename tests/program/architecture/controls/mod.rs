@@ -71,7 +71,7 @@ fn folder_is_read_recursively() {
     let paths: Vec<&str> = files.iter().map(|source| source.path.as_str()).collect();
     assert_eq!(paths, texts.map(|(path, _)| path));
     assert_eq!(files.rooms(), BTreeSet::from(["ask", "error"]));
-    assert_none(&rules::awaits(&files, &[]));
+    assert_none(&rules::awaits([&files], &[]));
     let found = rules::imports(&files, &map(), &[]);
     assert_eq!(found, ["src/ask/wire/mod.rs:1: `ask` may not use `score`"]);
 }

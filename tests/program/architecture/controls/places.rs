@@ -40,7 +40,7 @@ fn missing_code_and_long_files_reported() {
 
 #[test]
 fn listings_in_other_places_are_reported() {
-    let rule = |files: &Files| rules::listings(files, &["dataset"], &["dataset/root.rs"]);
+    let rule = |files: &Files| rules::listings([files], &["dataset"], &["dataset/root.rs"]);
     let unused = "a list of a folder or an open file may stand in dataset/root.rs, but does not: delete this place";
     check(
         rule,
@@ -54,7 +54,7 @@ fn listings_in_other_places_are_reported() {
     check(rule, &[], &["dataset/root.rs: fn f() { files::entries(p) } ++ engine/a.rs: fn f() { std::fs::read(p) }"]);
     check(rule, &[unused], &["dataset/a.rs: #[cfg(test)] mod tests { fn f() { std::fs::read(p) } }"]);
     check(
-        |files: &Files| rules::listings(files, &["dataset"], &["dataset"]),
+        |files: &Files| rules::listings([files], &["dataset"], &["dataset"]),
         &["dataset is a folder: name its files"],
         &["dataset/a.rs: use crate::files::entries;"],
     );
@@ -62,7 +62,7 @@ fn listings_in_other_places_are_reported() {
 
 #[test]
 fn misplaced_awaits_are_reported() {
-    let rule = |files: &Files| rules::awaits(files, &["ask"]);
+    let rule = |files: &Files| rules::awaits([files], &["ask"]);
     let unused = "`.await` may stand in ask, but does not: delete this place";
     check(
         rule,
@@ -91,7 +91,7 @@ fn misplaced_awaits_are_reported() {
 
 #[test]
 fn misplaced_libraries_are_reported() {
-    let rule = |files: &Files| rules::library(files, "image", &["enhance"]);
+    let rule = |files: &Files| rules::library([files], "image", &["enhance"]);
     let outside = "src/types/a.rs:1: `image` may stand only in enhance";
     let unused = "`image` may stand in enhance, but does not: delete this place";
     check(

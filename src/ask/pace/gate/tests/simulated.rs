@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicUsize;
 use std::sync::atomic::Ordering::Relaxed;
 
 use super::succeed;
-use crate::ask::pace::gate::*;
+use crate::pace::gate::*;
 
 /// Random numbers in [0, 1): Knuth's generator (MMIX).
 pub(super) struct Dice(pub(super) u64);

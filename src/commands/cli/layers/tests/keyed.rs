@@ -4,7 +4,7 @@ use clap::CommandFactory as _;
 
 use super::*;
 use crate::commands::cli::Cli;
-use crate::types::flags::KEYED_FLAGS;
+use darkqa_base::types::flags::KEYED_FLAGS;
 
 /// Sets each key of an evaluation by its hidden flag and by its keyed flag, and compares the two.
 #[test]

@@ -1,12 +1,12 @@
 use std::num::NonZeroUsize;
 
 use super::*;
-use crate::engine::images::frames::{CameraScope, DegradeStage, SourceFrame};
-use crate::files::FolderAccess;
-use crate::pictures::Scaling;
-use crate::types::{Digest, EnhancerName, InputNote};
+use crate::images::frames::{CameraScope, DegradeStage, SourceFrame};
+use darkqa_base::files::FolderAccess;
+use darkqa_base::types::{Digest, EnhancerName, InputNote};
 use darkqa_enhance::SizeArgs;
 use darkqa_light::KindSettings;
+use darkqa_pictures::Scaling;
 
 fn recipe() -> Recipe {
     Recipe {
