@@ -14,6 +14,7 @@ use std::io::Cursor;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
+use bytes::Bytes;
 use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageReader, Limits, RgbImage};
 
@@ -22,6 +23,7 @@ use self::facts::{FileFacts, InkForm, SampleType, fault};
 use self::format::FileFormat;
 use super::colour::{CodeDepth, CodeMeaning, ColourSpace, ColourTag, Inks};
 use super::decode_rule::{ColourRule, DecodeRule, Transfer};
+use super::payload::{Payload, PayloadFormat, plain_size};
 use darkqa_base::error::{Error, Result};
 use darkqa_base::files::{self, guarded};
 use darkqa_base::types::{ColourHandling, ColourNote, DepthNote, Digest, InputNote, Light, Pixels, Rgb, Rgb16Image};
@@ -30,7 +32,9 @@ use jpeg::with_standard_tables;
 /// A PNG, JPEG, WebP, TIFF, BMP or OpenEXR file in memory, not decoded.
 #[derive(Debug)]
 pub struct ImageFile {
-    bytes: Vec<u8>,
+    bytes: Bytes,
+    /// Digest of the bytes, computed on first use.
+    digest: OnceLock<Digest>,
     place: String,
     rule: DecodeRule,
     orientation_use: OrientationUse,
@@ -60,7 +64,14 @@ impl ImageFile {
     /// An image file with these bytes. `place` is its path, and line if any, for messages.
     #[must_use]
     pub fn new(bytes: Vec<u8>, place: String, rule: DecodeRule) -> Self {
-        Self { bytes, place, rule, orientation_use: OrientationUse::Apply, facts: OnceLock::new() }
+        Self {
+            bytes: bytes.into(),
+            digest: OnceLock::new(),
+            place,
+            rule,
+            orientation_use: OrientationUse::Apply,
+            facts: OnceLock::new(),
+        }
     }
 
     /// Reads the file at a path.
@@ -116,11 +127,25 @@ impl ImageFile {
         &self.bytes
     }
 
+    /// The file for a request, unchanged, if it is a plain PNG file of 8-bit RGB pixels that no chunk displays otherwise
+    /// and that holds nothing but them; else `None`. Its bytes are shared, and its digest is that of the file. It is not
+    /// checked for damage: it must have been decoded before.
+    #[must_use]
+    pub fn plain_png(&self) -> Option<Payload> {
+        let size = plain_size(&self.bytes)?;
+        Some(Payload::of_file(self.bytes.clone(), self.file_digest(), size, PayloadFormat::Png))
+    }
+
+    /// The digest of the bytes.
+    fn file_digest(&self) -> Digest {
+        *self.digest.get_or_init(|| Digest::from_bytes(&self.bytes))
+    }
+
     /// The digest of the file and of the changes that reading makes to its codes. Without changes, the digest of the
     /// file alone.
     #[must_use]
     pub fn digest(&self) -> Digest {
-        let file = Digest::from_bytes(&self.bytes);
+        let file = self.file_digest();
         match self.note().rule() {
             None => file,
             Some(rule) => Digest::from_parts([&b"darkqa.reading/1"[..], file.as_bytes(), rule.as_bytes()]),

@@ -10,10 +10,14 @@ use std::borrow::Cow;
 use std::fmt;
 use std::io::Cursor;
 use std::str::FromStr;
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+use std::sync::LazyLock;
 use std::sync::{Arc, OnceLock};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+use base64::engine::{general_purpose::PAD, simd::Simd};
 use bytes::Bytes;
 use clap::Args;
 use exr::prelude::{Encoding, Image, Layer, LayerAttributes, SpecificChannels, Vec2, WritableImage as _};
@@ -58,21 +62,18 @@ impl Payload {
         Ok(Self::from_file(file, width, height, format))
     }
 
-    /// Takes a PNG file unchanged if it contains only plain 8-bit RGB pixels and no chunk that changes their display or
-    /// adds information; otherwise returns `None`. The file is not checked for damage: it must have been decoded
-    /// before.
-    #[must_use]
-    pub fn from_plain_png(file: &[u8]) -> Option<Self> {
-        let (width, height) = plain_size(file)?;
-        Some(Self::from_file(file.to_vec(), width, height, PayloadFormat::Png))
-    }
-
     /// A file that was encoded in this format, with its width and height in pixels.
     #[must_use]
     pub fn from_file(file: Vec<u8>, width: u32, height: u32, format: PayloadFormat) -> Self {
+        let digest = Digest::from_bytes(&file);
+        Self::of_file(file.into(), digest, (width, height), format)
+    }
+
+    /// A file with its digest, and its width and height in pixels.
+    pub(crate) fn of_file(file: Bytes, digest: Digest, (width, height): (u32, u32), format: PayloadFormat) -> Self {
         Self {
             facts: ImageFacts {
-                digest: Digest::from_bytes(&file),
+                digest,
                 bytes: file.len(),
                 width: width as usize,
                 height: height as usize,
@@ -81,7 +82,7 @@ impl Payload {
                 exposure: None,
                 pair: None,
             },
-            file: file.into(),
+            file,
             data_url: OnceLock::new(),
             pixels: OnceLock::new(),
         }
@@ -178,7 +179,7 @@ impl Payload {
             .get_or_init(|| {
                 let mut url = format!("data:image/{};base64,", self.facts.format);
                 url.reserve_exact(self.file.len().div_ceil(3) * 4);
-                STANDARD.encode_string(&self.file, &mut url);
+                BASE64.encode_string(&self.file, &mut url);
                 url.into()
             })
             .clone()
@@ -271,6 +272,12 @@ impl FromStr for PayloadFormat {
     }
 }
 
+/// Encoder of data URLs.
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+static BASE64: LazyLock<Simd> = LazyLock::new(|| Simd::standard(PAD));
+#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+static BASE64: &base64::engine::GeneralPurpose = &STANDARD;
+
 const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// Width and height of a PNG file that contains only plain 8-bit RGB pixels, in pixels; `None` for other files.
@@ -278,7 +285,7 @@ const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 /// Besides header, image data and end, only chunks without effect are accepted (`sRGB`, and `pHYs` with square pixels).
 /// Other chunks (transparency, gamma, profiles, orientation, frames, text) could change the display, or send more than
 /// the pixels.
-fn plain_size(file: &[u8]) -> Option<(u32, u32)> {
+pub(crate) fn plain_size(file: &[u8]) -> Option<(u32, u32)> {
     let mut rest = file.strip_prefix(SIGNATURE)?;
     let (first, header, after) = chunk(rest)?;
     if &first != b"IHDR" {
@@ -425,6 +432,7 @@ pub fn exr(light: &Light) -> Result<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{DecodeRule, ImageFile};
 
     fn noise(height: usize, width: usize) -> Rgb {
         let samples = (0..height * width * 3).map(|i| (i * i % 251) as u8);
@@ -487,10 +495,20 @@ mod tests {
         let image = noise(8, 9);
         let encoded = Payload::encode(&image, PayloadFormat::Png).unwrap();
         let bytes = file(&encoded);
-        let plain = Payload::from_plain_png(&bytes).unwrap();
+        let read = |bytes: &[u8]| ImageFile::new(bytes.to_vec(), String::new(), DecodeRule::default());
+        let plain = read(&bytes).plain_png().unwrap();
         assert_eq!(plain.facts(), encoded.facts());
         assert_eq!(plain.data_url(), encoded.data_url());
-        assert!(Payload::from_plain_png(&bytes[1..]).is_none());
+        assert!(read(&bytes[1..]).plain_png().is_none());
+    }
+
+    #[test]
+    fn data_urls_are_standard_base64_at_every_length() {
+        for length in (0..400).chain([99_999, 100_000, 100_001]) {
+            let bytes: Vec<u8> = (0..length).map(|i: usize| (i * i + i / 7) as u8).collect();
+            let url = Payload::from_file(bytes.clone(), 1, 1, PayloadFormat::Png).data_url();
+            assert_eq!(url, format!("data:image/png;base64,{}", STANDARD.encode(&bytes)), "{length}");
+        }
     }
 
     #[test]

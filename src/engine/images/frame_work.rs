@@ -128,7 +128,7 @@ impl<'a> FrameWork<'a> {
         let Picture::Encoded(file) = self.picture()? else {
             return Ok(None);
         };
-        Payload::from_plain_png(file.bytes())
+        file.plain_png()
             .filter(|payload| {
                 let (width, height) = payload.size();
                 scaling.size(width as u32, height as u32) == payload.size()

@@ -71,7 +71,7 @@ fn decoding_error(bytes: Vec<u8>) -> String {
 #[test]
 fn a_corrupt_png_is_named() {
     let image = RgbImage::from_fn(64, 64, |x, y| image::Rgb([x as u8, y as u8, (x * y) as u8]));
-    let bytes = png(&image.into()).bytes;
+    let bytes = png(&image.into()).bytes().to_vec();
     let data = bytes.windows(4).position(|four| four == b"IDAT").unwrap() + 4;
     let end = bytes.len() - 12;
     for at in [data, data + 40, end - 5] {
@@ -179,7 +179,7 @@ fn a_truncated_jpeg_is_named() {
 
 #[test]
 fn a_decompression_bomb_is_refused() {
-    let mut bomb = png(&GrayImage::new(1, 1).into());
-    bomb.bytes[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
-    assert!(bomb.check().is_err());
+    let mut bomb = png(&GrayImage::new(1, 1).into()).bytes().to_vec();
+    bomb[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
+    assert!(image_file(bomb, "").check().is_err());
 }
