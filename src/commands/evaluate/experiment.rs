@@ -16,13 +16,13 @@ use darkqa_ask::{ImagePlaces, Query, Wording};
 use darkqa_base::error::{Error, Result};
 use darkqa_base::types::manifests::{Columns, Identity, PartPlace, RunManifest};
 use darkqa_base::types::{
-    ChoiceDetail, Condition, Digest, FrameId, Question, Record, RunQuestion, SetLight, Shared, TrialOutcome, View,
+    ChoiceDetail, Condition, FrameId, Question, Record, RunQuestion, SetLight, Shared, TrialOutcome, View,
 };
 use darkqa_engine::experiment::Experiment;
 use darkqa_engine::images::frames::{Frames, Source};
 use darkqa_engine::images::recipes::Recipe;
 use darkqa_engine::images::trials::{ASK, Item, Prompt, SourcePlan, Stimulus, Trial, TrialGroup};
-use darkqa_engine::key_facts::KeyFacts;
+use darkqa_engine::key_facts::{Asked, KeyHead};
 use darkqa_engine::manifest;
 use darkqa_engine::models::{ModelUnderTest, asked_in};
 use darkqa_engine::settings::JobSettings;
@@ -233,6 +233,8 @@ struct QuestionPrompts {
     item: ChoiceItem,
     image: Prompt,
     blind: Prompt,
+    /// What the keys share of all trials that show the image, and of those that do not.
+    key_heads: [KeyHead; 2],
     /// Position of the question among all selected ones.
     place: usize,
     /// Draws of the noise under which it is asked in this wording and order; `None` for all.
@@ -262,17 +264,24 @@ struct FrameQuestions {
 
 /// Adds all trials, grouped by frame: first the trials without an image, then those of each condition.
 fn plan_trials(setup: &ChoiceSetup<'_>, add: &mut dyn FnMut(SourcePlan<ChoiceItem>)) -> Result<()> {
-    let mut by_source = Vec::new();
-    by_source.resize_with(setup.sources.len(), FrameQuestions::default);
+    let mut by_source = vec![[const { Vec::new() }; 2]; setup.sources.len()];
     for sample in &setup.samples {
         if let Some(source) = sample.source {
-            by_source[source].own.extend(prompts(setup, sample, None)?);
+            by_source[source][0].push(sample);
         }
         if let Some(shown) = sample.other_room {
-            by_source[shown].others.extend(prompts(setup, sample, Some(&setup.sources[shown].name))?);
+            by_source[shown][1].push(sample);
         }
     }
-    for (source, questions) in by_source.into_iter().enumerate() {
+    for (source, [own, others]) in by_source.into_iter().enumerate() {
+        // The prompts of one source at a time: those of all would fill the memory.
+        let mut questions = FrameQuestions::default();
+        for sample in own {
+            questions.own.extend(prompts(setup, sample, None)?);
+        }
+        for sample in others {
+            questions.others.extend(prompts(setup, sample, Some(&setup.sources[source].name))?);
+        }
         let shown = setup.conditions.iter().filter(|condition| setup.sources[source].can_show(condition));
         let groups = std::iter::once(None)
             .chain(shown.map(Some))
@@ -314,9 +323,12 @@ fn prompts(setup: &ChoiceSetup<'_>, sample: &Sample, shown_frame: Option<&FrameI
                     View::Image | View::Blind => prompt,
                 })
             };
+            let (image, blind) = (prompt(View::Image)?, prompt(View::Blind)?);
+            let key_head = |prompt| KeyHead::new(prompt, Some(question.choices.texts()));
             prompts.push(QuestionPrompts {
-                image: prompt(View::Image)?,
-                blind: prompt(View::Blind)?,
+                key_heads: [key_head(&image)?, key_head(&blind)?],
+                image,
+                blind,
                 place: sample.place,
                 draws,
                 item: ChoiceItem {
@@ -357,14 +369,21 @@ fn group(
     let mut keys = HashSet::new();
     let asked = own.chain(others).filter(|(shown, _)| shown.item.repeat < times && shown.is_asked_in(condition));
     for (shown, is_of_other) in asked {
-        let prompt = match view {
-            View::Image => &shown.image,
-            View::Blind => &shown.blind,
+        let (prompt, key_head) = match view {
+            View::Image => (&shown.image, &shown.key_heads[0]),
+            View::Blind => (&shown.blind, &shown.key_heads[1]),
+        };
+        let asked = Asked {
+            question: &shown.item.question.id,
+            places: prompt.places,
+            condition,
+            image,
+            repeat: shown.item.repeat,
         };
         for &(index, model) in models.iter().filter(|(_, model)| {
             model.is_asked(shown.place) && (view == View::Image && is_other_room(model)) == is_of_other
         }) {
-            let key = key_facts(shown, prompt, model, condition, image).key()?;
+            let key = key_head.key(model, asked)?;
             if has_wordings && !keys.insert(key) {
                 continue;
             }
@@ -391,16 +410,4 @@ fn prompt_digests(wordings: &[Wording]) -> Value {
 /// Number of shuffled orders as a setting; `true` for one, as earlier versions wrote it.
 fn shuffle_setting(orders: NonZeroU32) -> Value {
     if orders == NonZeroU32::MIN { true.into() } else { orders.get().into() }
-}
-
-fn key_facts<'a>(
-    shown: &'a QuestionPrompts,
-    prompt: &'a Prompt,
-    model: &'a ModelUnderTest,
-    condition: Option<&'a Condition>,
-    image: Option<Digest>,
-) -> KeyFacts<'a> {
-    let question = &*shown.item.question;
-    KeyFacts::new(model, &question.id, prompt, condition, image)
-        .with_choices(question.choices.texts(), shown.item.repeat)
 }

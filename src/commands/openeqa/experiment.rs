@@ -24,7 +24,7 @@ use darkqa_engine::experiment::{ExpectedRequest, Experiment};
 use darkqa_engine::images::frames::{Frames, Source};
 use darkqa_engine::images::recipes::Recipe;
 use darkqa_engine::images::trials::{Item as _, Prompt, SourcePlan, Trial, TrialGroup};
-use darkqa_engine::key_facts::KeyFacts;
+use darkqa_engine::key_facts::{Asked, KeyHead};
 use darkqa_engine::manifest;
 use darkqa_engine::models::{ModelUnderTest, asked_in};
 use darkqa_engine::settings::JobSettings;
@@ -231,10 +231,12 @@ fn group(
     let mut trials = Vec::new();
     for question in questions {
         let prompt = prompt(question, view);
+        let key_head = KeyHead::new(&prompt, None)?;
+        let asked = Asked { question: &question.id, places: prompt.places, condition, image: images, repeat: 0 };
         let place = setup.question_places[&question.id];
         for &(index, model) in models.iter().filter(|(_, model)| model.is_asked(place)) {
             trials.push(Trial {
-                key: KeyFacts::new(model, &question.id, &prompt, condition, images).key()?,
+                key: key_head.key(model, asked)?,
                 model: index,
                 prompt: prompt.clone(),
                 item: OpenItem::Answer(Arc::clone(question)),

@@ -71,9 +71,42 @@ impl Digest {
     /// If a key of a map is not a string.
     #[cfg(feature = "program")]
     pub fn presorted(domain: &'static str, value: &impl serde::Serialize) -> Result<Self, Error> {
+        Ok(Self::from_text(domain, &Self::presorted_text(domain, value)?))
+    }
+
+    /// The text that [`Digest::presorted`] hashes.
+    ///
+    /// # Errors
+    /// As [`Digest::presorted`].
+    #[cfg(feature = "program")]
+    pub fn presorted_text(domain: &'static str, value: &impl serde::Serialize) -> Result<String, Error> {
         let text = serde_json::to_string(value).map_err(|e| Error::data(domain, e))?;
         debug_assert_eq!(canonical(value).ok().map(|value| value.to_string()).as_ref(), Some(&text));
-        Ok(Self::from_text(domain, &text))
+        Ok(text)
+    }
+
+    /// [`Digest::presorted`] of one object: its first fields are those of `head`, a text of [`Digest::presorted_text`],
+    /// and its further ones those of `rest`. Both have fields, and in each the names are sorted behind those before.
+    ///
+    /// # Errors
+    /// As [`Digest::presorted`].
+    #[cfg(feature = "program")]
+    pub fn presorted_after(domain: &'static str, head: &str, rest: &impl serde::Serialize) -> Result<Self, Error> {
+        let head = head.strip_suffix('}').unwrap_or(head);
+        // Names of models, questions and conditions, and two digests.
+        let mut text = Vec::with_capacity(domain.len() + head.len() + 512);
+        text.extend_from_slice(domain.as_bytes());
+        text.push(0);
+        text.extend_from_slice(head.as_bytes());
+        let comma = text.len();
+        serde_json::to_writer(&mut text, rest).map_err(|e| Error::data(domain, e))?;
+        // In place of the brace that opens the rest.
+        text[comma] = b',';
+        debug_assert!(
+            serde_json::from_slice(&text[domain.len() + 1..])
+                .is_ok_and(|value: serde_json::Value| { value.to_string().as_bytes() == &text[domain.len() + 1..] })
+        );
+        Ok(Self::from_bytes(&text))
     }
 
     #[cfg(feature = "program")]
@@ -274,6 +307,31 @@ impl<T: Eq + Hash> Distinct<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn digest_of_two_parts_is_that_of_one_object() {
+        #[derive(serde::Serialize)]
+        struct Head<'a> {
+            before: &'a str,
+            choices: [&'a str; 2],
+        }
+        #[derive(serde::Serialize)]
+        struct Rest {
+            model: String,
+            repeat: u32,
+        }
+        let head = Head { before: "Is it \"red\"}?", choices: ["{yes}", "no\n"] };
+        let rest = Rest { model: "m".to_owned(), repeat: 2 };
+        let whole = serde_json::json!({
+            "before": head.before, "choices": head.choices, "model": rest.model, "repeat": rest.repeat,
+        });
+        let text = Digest::presorted_text("darkqa.test/1", &head).unwrap();
+        let digest = Digest::presorted_after("darkqa.test/1", &text, &rest).unwrap();
+        assert_eq!(digest, Digest::canonical("darkqa.test/1", &whole).unwrap());
+        assert_ne!(digest, Digest::presorted_after("darkqa.test/2", &text, &rest).unwrap());
+        let other = Rest { repeat: 3, ..rest };
+        assert_ne!(digest, Digest::presorted_after("darkqa.test/1", &text, &other).unwrap());
+    }
 
     #[test]
     fn canonical_digest_hashes_domain_and_json() {
