@@ -31,23 +31,18 @@ pub use costs::{
     ChargeRatios, ImageTokenCheck, Price, PricedRequest, Prices, ReplyExcess, Reservation, Spending, TokenBound,
     Unpriced, scaling_image_tokens, stated_charge,
 };
-pub use endpoints::{AccessArgs, OPENAI_KEY, Server, sleep_running, vendor_variables};
-pub use failures::QuotaRefusal;
-pub use models::{Local, LocalAnswer};
-pub use pace::{ConcurrencyBounds, HeldBack, PaceCause};
-pub use requests::{ChangedSetting, ImageLimit, ImagePlaces, RequestArgs, by_flag};
-pub use secrets::{KeyHeader, is_secret_header, is_secret_value, looks_like_key};
-pub use wire::is_context_full;
-
-pub use endpoints::{Access, BaseUrl, Endpoint, Sending};
-pub use failures::{AskError, Reach};
-pub use models::{Model, Random, Remote, Script};
-pub use pace::Quota;
+pub use endpoints::{
+    Access, AccessArgs, BaseUrl, Endpoint, OPENAI_KEY, Sending, Server, sleep_running, vendor_variables,
+};
+pub use failures::{AskError, QuotaRefusal, Reach};
+pub use models::{Local, LocalAnswer, Model, Random, Remote, Script};
+pub use pace::{ConcurrencyBounds, HeldBack, PaceCause, Quota};
 pub use prompts::Prompts;
 pub use requests::{
-    Call, Constrain, ExtraFields, ImageDetail, Message, Parameters, Query, SettingsOrigin, Temperature, Thinking,
-    TokenField,
+    Call, ChangedSetting, Constrain, ExtraFields, ImageDetail, ImageLimit, ImagePlaces, Message, Parameters, Query,
+    RequestArgs, SettingsOrigin, Temperature, Thinking, TokenField, by_flag,
 };
-pub use secrets::Secret;
+pub use secrets::{KeyHeader, Secret, is_secret_header, is_secret_value, looks_like_key};
+pub use wire::is_context_full;
 pub use wire_kind::WireSetting;
 pub use wordings::{PromptSet, Wording};

@@ -24,16 +24,13 @@ mod settings;
 mod source;
 
 pub use bank::{Bank, BankSource};
-pub use frames::open_images;
+pub use dataset::Dataset;
+pub use frames::{open_frames, open_images};
 pub use maps::Picture;
 pub use openeqa::ImageSource;
 pub use photographs::Photographs;
-pub use ready_made::{ParquetColumns, SkipBad, cached_snapshot, refuse_lfs_pointer};
+pub use ready_made::{ParquetColumns, SetArgs, SkipBad, cached_snapshot, refuse_lfs_pointer};
 pub use root::{Root, RootArgs};
 pub use scene_args::SceneArgs;
 pub use settings::{BankArgs, DataArgs, DecodeArgs, FolderArgs, PixelLimit, SelectionArgs, parse_data_source};
-
-pub use dataset::Dataset;
-pub use frames::open_frames;
-pub use ready_made::SetArgs;
 pub use source::DataSource;

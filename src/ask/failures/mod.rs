@@ -10,6 +10,4 @@ pub(super) use ask_error::{LONG_SILENCE, Refusal, Retry, Unfinished};
 pub(super) use refused::implied_status;
 pub(super) use vocabulary::{Wording, is_moderated, is_out_of_tokens};
 
-pub use ask_error::{AskError, Reach};
-
-pub use ask_error::QuotaRefusal;
+pub use ask_error::{AskError, QuotaRefusal, Reach};

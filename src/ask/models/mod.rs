@@ -6,8 +6,6 @@ mod model;
 mod remote;
 mod stream_fallback;
 
-pub use local::{Local, LocalAnswer};
-
-pub use local::{Random, Script};
+pub use local::{Local, LocalAnswer, Random, Script};
 pub use model::Model;
 pub use remote::Remote;

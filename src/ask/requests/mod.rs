@@ -7,15 +7,11 @@ pub(super) mod field;
 mod image_limit;
 mod parameters;
 
-pub use call::ImagePlaces;
+pub use call::{Call, ImagePlaces, Message, Query};
 pub use continued::ChangedSetting;
-pub use extra_fields::RequestArgs;
+pub use extra_fields::{ExtraFields, RequestArgs, Thinking};
 pub use image_limit::ImageLimit;
-pub use parameters::by_flag;
-
-pub use call::{Call, Message, Query};
-pub use extra_fields::{ExtraFields, Thinking};
-pub use parameters::{Constrain, ImageDetail, Parameters, SettingsOrigin, Temperature, TokenField};
+pub use parameters::{Constrain, ImageDetail, Parameters, SettingsOrigin, Temperature, TokenField, by_flag};
 
 pub(super) use call::{AfterTimeout, MessagePart, Request, RequestBody, images};
 pub(super) use extra_fields::ThinkingBudget;

@@ -39,9 +39,7 @@ pub use data::fitting_thumbnails;
 pub use head::PageHead;
 pub use items::{note as items_note, packed as packed_items};
 pub use prompts::RunPrompts;
-pub use run_usage::{PageRun, RunUsage};
-
-pub use run_usage::PageInputs;
+pub use run_usage::{PageInputs, PageRun, RunUsage};
 
 /// Template of the page.
 const PAGE: &str = include_str!("page.html");
