@@ -29,8 +29,8 @@ pub mod openeqa {
     pub const VISION: &str = include_str!("openeqa/vision.txt");
     /// A question without them.
     pub const BLIND: &str = include_str!("openeqa/blind.txt");
-    /// What the judge is asked.
+    /// The prompt of the judge.
     pub const MATCH: &str = include_str!("openeqa/match.txt");
-    /// What the judge is asked if further answers are right.
+    /// The prompt of the judge for a question with further right answers.
     pub const MATCH_EXTRA: &str = include_str!("openeqa/match-extra.txt");
 }

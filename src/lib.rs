@@ -95,7 +95,7 @@
 //!
 //! | room | |
 //! |---|---|
-//! | `base` | the one error type; files read with bounds and written whole; the label spaces NYU40, mpcat40, ADE150 and NYU13; the vocabulary of a trial. |
+//! | `base` | the one error type; files read with bounds and written whole; the label spaces NYU40, mpcat40, ADE150 and NYU13; the vocabulary of a trial |
 //! | `pictures` | image files with their colour profiles and orientation, maps of numbers, scaling, and images encoded for a request |
 //! | `light` | a clean image × a degradation → a degraded one, given a noise key; `light/python` is the Python module `darkqa_light` |
 //! | `data` | a folder, a ready-made set or the built-in rooms (`data/rooms`, drawn by a seed) → images, their maps and questions; `data/import`: other data sets, recordings of robots and videos → frames |

@@ -50,7 +50,7 @@ struct TailFacts<'a> {
     repeat: Option<u32>,
 }
 
-/// What is asked about: the question, its images, and how often it was asked before.
+/// A question as one trial asks it.
 #[derive(Debug, Clone, Copy)]
 pub struct Asked<'a> {
     pub question: &'a QuestionId,

@@ -127,13 +127,13 @@ impl ImageFile {
         &self.bytes
     }
 
-    /// The file for a request, unchanged, if it is a plain PNG file of 8-bit RGB pixels that no chunk displays otherwise
-    /// and that holds nothing but them; else `None`. Its bytes are shared, and its digest is that of the file. It is not
-    /// checked for damage: it must have been decoded before.
+    /// The file as a payload, with the same bytes, if it is a PNG file that contains only plain 8-bit RGB pixels and no
+    /// chunk that changes their display or adds information; otherwise `None`. The file is not checked for damage: it
+    /// must have been decoded before.
     #[must_use]
     pub fn plain_png(&self) -> Option<Payload> {
         let size = plain_size(&self.bytes)?;
-        Some(Payload::of_file(self.bytes.clone(), self.file_digest(), size, PayloadFormat::Png))
+        Some(Payload::with_digest(self.bytes.clone(), self.file_digest(), size, PayloadFormat::Png))
     }
 
     /// The digest of the bytes.

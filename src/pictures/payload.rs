@@ -66,11 +66,11 @@ impl Payload {
     #[must_use]
     pub fn from_file(file: Vec<u8>, width: u32, height: u32, format: PayloadFormat) -> Self {
         let digest = Digest::from_bytes(&file);
-        Self::of_file(file.into(), digest, (width, height), format)
+        Self::with_digest(file.into(), digest, (width, height), format)
     }
 
     /// A file with its digest, and its width and height in pixels.
-    pub(crate) fn of_file(file: Bytes, digest: Digest, (width, height): (u32, u32), format: PayloadFormat) -> Self {
+    pub(crate) fn with_digest(file: Bytes, digest: Digest, (width, height): (u32, u32), format: PayloadFormat) -> Self {
         Self {
             facts: ImageFacts {
                 digest,

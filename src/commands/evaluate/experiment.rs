@@ -231,14 +231,18 @@ impl Item for ChoiceItem {
 /// One wording and order of a question, with the prompts for models that see the image and for blind models.
 struct QuestionPrompts {
     item: ChoiceItem,
-    image: Prompt,
-    blind: Prompt,
-    /// What the keys share of all trials that show the image, and of those that do not.
-    key_heads: [KeyHead; 2],
+    image: KeyedPrompt,
+    blind: KeyedPrompt,
     /// Position of the question among all selected ones.
     place: usize,
     /// Draws of the noise under which it is asked in this wording and order; `None` for all.
     draws: Option<Vec<u16>>,
+}
+
+/// A prompt, with the inputs that the keys of all its trials share.
+struct KeyedPrompt {
+    prompt: Prompt,
+    key_head: KeyHead,
 }
 
 impl QuestionPrompts {
@@ -274,7 +278,7 @@ fn plan_trials(setup: &ChoiceSetup<'_>, add: &mut dyn FnMut(SourcePlan<ChoiceIte
         }
     }
     for (source, [own, others]) in by_source.into_iter().enumerate() {
-        // The prompts of one source at a time: those of all would fill the memory.
+        // Only the prompts of one source are in memory at a time.
         let mut questions = FrameQuestions::default();
         for sample in own {
             questions.own.extend(prompts(setup, sample, None)?);
@@ -323,12 +327,14 @@ fn prompts(setup: &ChoiceSetup<'_>, sample: &Sample, shown_frame: Option<&FrameI
                     View::Image | View::Blind => prompt,
                 })
             };
-            let (image, blind) = (prompt(View::Image)?, prompt(View::Blind)?);
-            let key_head = |prompt| KeyHead::new(prompt, Some(question.choices.texts()));
+            let keyed = |view| {
+                let prompt = prompt(view)?;
+                let key_head = KeyHead::new(&prompt, Some(question.choices.texts()))?;
+                Ok::<_, Error>(KeyedPrompt { prompt, key_head })
+            };
             prompts.push(QuestionPrompts {
-                key_heads: [key_head(&image)?, key_head(&blind)?],
-                image,
-                blind,
+                image: keyed(View::Image)?,
+                blind: keyed(View::Blind)?,
                 place: sample.place,
                 draws,
                 item: ChoiceItem {
@@ -369,9 +375,9 @@ fn group(
     let mut keys = HashSet::new();
     let asked = own.chain(others).filter(|(shown, _)| shown.item.repeat < times && shown.is_asked_in(condition));
     for (shown, is_of_other) in asked {
-        let (prompt, key_head) = match view {
-            View::Image => (&shown.image, &shown.key_heads[0]),
-            View::Blind => (&shown.blind, &shown.key_heads[1]),
+        let KeyedPrompt { prompt, key_head } = match view {
+            View::Image => &shown.image,
+            View::Blind => &shown.blind,
         };
         let asked = Asked {
             question: &shown.item.question.id,

@@ -86,7 +86,8 @@ impl Digest {
     }
 
     /// [`Digest::presorted`] of one object: its first fields are those of `head`, a text of [`Digest::presorted_text`],
-    /// and its further ones those of `rest`. Both have fields, and in each the names are sorted behind those before.
+    /// and its further ones those of `rest`. Both have at least one field, and every name in `rest` sorts after all in
+    /// `head`.
     ///
     /// # Errors
     /// As [`Digest::presorted`].
